@@ -18,10 +18,10 @@ from drake_disasm.effects.base import (
 from drake_disasm.effects.chains import environment_at
 
 _KINDS = (EnvironmentEffect, MotionEffect, PoseEffect, SensorEffect, ArmEffect)
-_OF_BOTH = frozenset(("X_GnG", "friction", "clearance", "force_Gn"))
+_OF_BOTH = frozenset(("X_GnG", "friction", "clearance", "force_Gn", "detent"))
 #: The quantities of an Environment that a contact model has, by `contact.model`.
 CONTACT_QUANTITIES = {
-    "hydroelastic": _OF_BOTH | {"modulus", "head_modulus", "dissipation", "detent"},
+    "hydroelastic": _OF_BOTH | {"modulus", "head_modulus", "dissipation"},
     "impact": _OF_BOTH | {"impact_stiffness", "impact_exponent"},
 }
 _OTHER_CONTACT = {

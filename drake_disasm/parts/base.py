@@ -24,7 +24,7 @@ from pydrake.multibody.tree import SpatialInertia
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import Environment
 from drake_disasm.parts.contact import ContactConfig
-from drake_disasm.parts.lock_shape import LockShape
+from drake_disasm.parts.gaps import Gaps
 from drake_disasm.parts.materials import rigid_material
 
 #: Forces and torques (6,), [f; tau].
@@ -106,9 +106,19 @@ class Part(abc.ABC):
         return "".join(AXES[stage.axis] for stage in self.stages)
 
     @property
-    def gaps(self) -> LockShape | None:
+    def gaps(self) -> Gaps | None:
         """The gaps between the bodies, nominal, for IMPACT; None has no such form."""
         return None
+
+    def impact_stiffness(self, contact: ContactConfig) -> float:
+        """Returns how stiff a place of `gaps` is, as hydroelastic contact has it [N/m].
+
+        An elastic foundation: modulus times area by half the body's width.
+
+        Args:
+            contact: what the bodies are made of.
+        """
+        return 1e3 * contact.impact.stiffness  # N/mm, for a part of one's own
 
     def environment(self, contact: ContactConfig) -> Environment:
         """Returns the moved body's environment before effects.
@@ -209,7 +219,7 @@ class Part(abc.ABC):
         """Longest way of a stage that is no turn [m]."""
         return max((s.end for s in self.stages if not s.is_turn), default=math.inf)
 
-    def required_gaps(self) -> LockShape:
+    def required_gaps(self) -> Gaps:
         """Returns `gaps`.
 
         Raises:

@@ -17,6 +17,8 @@ from drake_disasm.common.quantity import quantity
 from drake_disasm.common.spatial import rotation_vector
 from drake_disasm.effects import Environment
 from drake_disasm.parts.base import Solid, Stage, Wrench, cylinder_along_y
+from drake_disasm.parts.contact import ContactConfig
+from drake_disasm.parts.gaps import BayonetGaps
 from drake_disasm.parts.gripped_block import GrippedBlock
 from drake_disasm.parts.materials import (
     compliant_material,
@@ -78,6 +80,48 @@ class Bayonet(GrippedBlock):
         )
 
     @property
+    def gaps(self) -> BayonetGaps:
+        """See Part."""
+        radius = self.shaft_diameter / 2
+        return BayonetGaps(
+            shaft=radius,
+            hole=radius + self.clearance / 2,
+            plate=self.plate_thickness,
+            floor=self._floor,
+            end=self.touch_radius,
+            half=self.lug_width / 2,
+            top=self._lug_middle + self.lug_height / 2,
+            bottom=self._lug_middle - self.lug_height / 2,
+            cosine=float(np.cos(self.turn)),
+            sine=float(np.sin(self.turn)),
+            half_notch=self._half_notch,
+            notch_end=self._notch_end,
+            stop=self._stop,
+            detent=self.detent_torque,
+            detent_width=self.detent_width,
+        )
+
+    def impact_stiffness(self, contact: ContactConfig) -> float:
+        """See Part: of a quarter of a lug's face, as deep as half the lug."""
+        area = self.lug_length * self.lug_width / 4.0
+        return contact.head_modulus * area / (self.lug_height / 2.0)
+
+    @property
+    def _half_notch(self) -> float:
+        """Half width of a notch [m]."""
+        return (self.lug_width + self.notch_clearance) / 2
+
+    @property
+    def _notch_end(self) -> float:
+        """Radius of the notches' ends [m]."""
+        return self.touch_radius + self.notch_clearance / 2
+
+    @property
+    def _stop(self) -> float:
+        """From the notches' middle to the stops, a quarter of the play before [m]."""
+        return self.lug_width / 2 + self.notch_clearance / 4
+
+    @property
     def touch_radius(self) -> float:
         """See Part: of the lugs' ends."""
         return self.shaft_diameter / 2 + self.lug_length
@@ -126,9 +170,9 @@ class Bayonet(GrippedBlock):
         return solids | self._stops()
 
     def _stops(self) -> dict[str, Solid]:
-        """Returns what stops each lug under its notch, a quarter of the play before."""
+        """Returns what stops each lug under its notch."""
         solids: dict[str, Solid] = {}
-        beyond = self.lug_width / 2 + self.notch_clearance / 4 + _STOP / 2
+        beyond = self._stop + _STOP / 2
         height, middle = -self._floor - self.plate_thickness, self._lug_middle
         inner = self.shaft_diameter / 2 + 0.001  # the shaft goes by
         length = self.touch_radius - inner
@@ -145,8 +189,7 @@ class Bayonet(GrippedBlock):
         A circle for the shaft, with a notch on either side for a lug.
         """
         radius = (self.shaft_diameter + clearance) / 2
-        half = (self.lug_width + self.notch_clearance) / 2
-        end = self.touch_radius + self.notch_clearance / 2
+        half, end = self._half_notch, self._notch_end
         facets = facet_count(2 * radius, clearance)
         ring = circle(radius, facets)
         across, along = ring[:, 1], np.abs(ring[:, 0])
@@ -189,7 +232,7 @@ class Bayonet(GrippedBlock):
 
     def refuse_impossible(self) -> None:
         """See Part: the lugs must be wholly under the plate."""
-        half = (self.lug_width + self.notch_clearance) / 2
+        half = self._half_notch
         if half >= self.shaft_diameter / 2:
             raise DisasmError(
                 f"part.lug_width: {self.lug_width:g} m and part.notch_clearance are "

@@ -14,6 +14,8 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import quantity
 from drake_disasm.effects import Environment
 from drake_disasm.parts.base import Solid, Stage, cylinder_along_y
+from drake_disasm.parts.contact import ContactConfig
+from drake_disasm.parts.gaps import HoleGaps
 from drake_disasm.parts.gripped_block import GrippedBlock
 from drake_disasm.parts.materials import (
     compliant_material,
@@ -55,6 +57,26 @@ class PegInHole(GrippedBlock):
     def stages(self) -> tuple[Stage, ...]:
         """See Part: up, until the tip is level with the block's face."""
         return (Stage(1, self.depth, _PULL),)
+
+    @property
+    def gaps(self) -> HoleGaps:
+        """See Part."""
+        return HoleGaps(
+            is_square=float(self.cross_section == "square"),
+            half=self.width / 2,
+            hole=(self.width + self.clearance) / 2,
+            tip=-self.depth,
+            floor=-self.depth - _BELOW,
+        )
+
+    def impact_stiffness(self, contact: ContactConfig) -> float:
+        """See Part: of half the depth at the tip, and half at the mouth.
+
+        A square has two corners at each.
+        """
+        if self.cross_section == "round":
+            return contact.modulus * self.depth
+        return contact.head_modulus * self.depth / 2.0
 
     @property
     def touch_radius(self) -> float:

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from drake_disasm.common.arrays import Array, array_like, namespace, side_by_side
 from drake_disasm.common.rotations import Pose
 from drake_disasm.effects import Environment
-from drake_disasm.parts.lock_shape import LockShape
+from drake_disasm.parts.gaps import Gaps
 from drake_disasm.twin.law import ImpactLaw
 
 
@@ -60,7 +60,7 @@ class ImpactConditions:
 
     Attributes:
         law: of the normal force.
-        shape: of the lock.
+        gaps: of the part.
         around: what may differ from state to state.
         M: (6, 6) mass matrix of the twin's joints, at their zero.
         K, D: (6,) their stiffness and damping.
@@ -68,7 +68,7 @@ class ImpactConditions:
     """
 
     law: ImpactLaw
-    shape: LockShape
+    gaps: Gaps
     around: Surroundings
     M: Array
     K: Array
@@ -79,7 +79,7 @@ class ImpactConditions:
     def of(
         cls,
         law: ImpactLaw,
-        shape: LockShape,
+        gaps: Gaps,
         environment: Environment,
         like: Array,
         **joints: Array,
@@ -87,7 +87,7 @@ class ImpactConditions:
         """Returns the conditions in an environment, or in n.
 
         Args:
-            law, shape: nominal.
+            law, gaps: nominal.
             environment: in which bolts are.
             like: see `Surroundings.of`.
             joints: M, K, D and p_BoTo_B.
@@ -97,15 +97,15 @@ class ImpactConditions:
             stiffness=environment.impact_stiffness,
             exponent=environment.impact_exponent,
         )
-        shape = shape.with_clearance(environment.clearance)
-        return cls(law, shape, Surroundings.of(environment, like), **joints)
+        gaps = gaps.changed_by(environment)
+        return cls(law, gaps, Surroundings.of(environment, like), **joints)
 
     @functools.cached_property
     def table(self) -> Array:
-        """All of it, a row for each state or one for all (m, 83); see `equations`."""
+        """All of it, a row for each state or one for all (m, 87); see `equations`."""
         around = self.around
         columns = [
-            *((value, ()) for value in (*self.law.row, *self.shape.row)),
+            *((value, ()) for value in (*self.law.row, *self.gaps.row)),
             (around.friction, ()),
             (around.R_GnG, (3, 3)),
             (around.p_GnG, (3,)),

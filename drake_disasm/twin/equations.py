@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from drake_disasm.common.compiled import compiled
+from drake_disasm.parts.gaps import GAPS_SIZE, HOLE, SLOT
 
 _MM = 1000.0
 _LEAST = 1e-12  # mm: a power of zero has no slope
@@ -31,9 +32,13 @@ _RIM_POINTS = 8
 _ANGLES = 2.0 * np.pi * np.arange(_RIM_POINTS) / _RIM_POINTS
 _RIM = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
 
+#: How many places of a part can touch, at most.
+PLACES = 24
+_STOPS, _PLANES = 6, 8  # a slot's first places at the stops, and at lips and floor
 
-def _normals() -> np.ndarray:
-    """Returns the normals (k, 3) of all places, out of the groove."""
+
+def _slot_normals() -> np.ndarray:
+    """Returns the normals (24, 3) of a slot's places: along the groove's axes."""
     across = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
     stops = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     up = np.array([[0.0, 1.0, 0.0]])
@@ -41,13 +46,7 @@ def _normals() -> np.ndarray:
     return np.concatenate([across, across, across, stops, planes])
 
 
-#: (k, 3) of all places, out of the groove, towards the bolt, in G: along its axes.
-NORMALS = _normals()
-PLACES = len(NORMALS)
-_STOPS, _PLANES = 6, 8  # first places at the stops, and at lips and floor
-# Along which axis, and to which side.
-_AXES = np.argmax(np.abs(NORMALS), axis=1)
-_SIDES = np.sum(NORMALS, axis=1)
+_SLOT_NORMALS = _slot_normals()
 
 
 def _begins(*sizes: int) -> tuple[int, ...]:
@@ -55,9 +54,9 @@ def _begins(*sizes: int) -> tuple[int, ...]:
     return tuple(itertools.accumulate(sizes, initial=0))
 
 
-#: A row of `ImpactConditions.table`: the law, the lock, the surroundings ...
-(LAW, LOCK, FRICTION, _R_GNG, _P_GNG, _F_GN, _M0, _K, _D, _P_BOTO, _BODY) = _begins(
-    *(4, 12, 1, 9, 3, 3, 36, 6, 6, 3)
+#: A row of `ImpactConditions.table`: the law, the gaps, the surroundings ...
+(LAW, GAPS, FRICTION, _R_GNG, _P_GNG, _F_GN, _M0, _K, _D, _P_BOTO, _BODY) = _begins(
+    *(4, GAPS_SIZE, 1, 9, 3, 3, 36, 6, 6, 3)
 )
 #: ... one of `Body.table`: mass, p_ToBcm_B, inertia about To in B, weight in Gn ...
 (_MASS, _P_TOBCM, _I_TO, _WEIGHT, _STATE) = (
@@ -82,15 +81,16 @@ def _begins(*sizes: int) -> tuple[int, ...]:
     _SIX + place for place in range(0, 60, 6)
 )
 _ACTING, _THREE = _SIX + 60, _SIX + 66
-#: ... (3,): p_ToBo in Gn, p_GBo, what is passed on within a function, a force and its
-#: slope (3, 6) by the twist ...
-(_P_TOBO, P_GBO, _ONE, _OTHER, _OMEGA, _C, _TURNED, _FORCE, _BY_TWIST, _PLACES) = (
-    _THREE + place for place in _begins(*[3] * 8, 18)
+#: ... (3,): p_ToBo in Gn, p_GBo, the torque of a part's spring in G and in Gn, what is
+#: passed on within a function, a force, its slip, its slope (3, 6) by the twist ...
+(_P_TOBO, P_GBO, SPRING, _SPRING_GN, _ONE, _OTHER, _OMEGA, _C, _TURNED, _FORCE) = (
+    _THREE + place for place in range(0, 30, 3)
 )
+(_SLIP, _BY_TWIST, _PLACES) = (_THREE + 30 + place for place in (0, 3, 21))
 #: ... of the places (k,): how deep they are, how fast they go in, which normal force
-#: lagged friction is of; (k, 3) arms from To in G.
-(DEPTH, _INWARD, PRESSED, ARM, SIZE) = (
-    _PLACES + place for place in _begins(PLACES, PLACES, PLACES, 3 * PLACES)
+#: lagged friction is of; (k, 3) arms from To, and normals out of the fixed body, in G.
+(DEPTH, _INWARD, PRESSED, ARM, NORMAL, SIZE) = (
+    _PLACES + place for place in _begins(PLACES, PLACES, PLACES, 3 * PLACES, 3 * PLACES)
 )
 
 
@@ -109,7 +109,7 @@ def advance_rows(
     """Advances some plants by some steps, one plant after the other.
 
     Args:
-        constants: of m twins, 1 for all or n: `ImpactConditions.table` (m, 83),
+        constants: of m twins, 1 for all or n: `ImpactConditions.table` (m, 87),
             `Body.table` (m, 16), F, C, P of `ArmStep` (m, 3, 12, 12).
         h: the step [s].
         steps: how many.
@@ -186,6 +186,7 @@ def _plant_step(h: float, arms: np.ndarray, arm: int, w: np.ndarray) -> bool:
     is_solved = _set_contact(h, w)
     for j in range(3):
         w[_WRENCH + j] += w[_F_GN + j]
+        w[_WRENCH + 3 + j] += w[_SPRING_GN + j]
     _set_dynamics(w)
     _set_joint_forces(w)
     for j in range(6):
@@ -364,7 +365,7 @@ def solve_rows(
     """Finds what `ImpactStep` has, of one state after the other.
 
     Args:
-        conditions: (m, 83) of `ImpactConditions`.
+        conditions: (m, 87) of `ImpactConditions`.
         bodies: (1, 16), which contact does not look at.
         h: the step [s].
         states: q, v, qd, vd (n, 6).
@@ -422,6 +423,8 @@ def _set_places(w: np.ndarray) -> None:
                 total += w[_R_GNG + 3 * a + j] * w[_R_GNB + 3 * a + k]
             w[R_GB + 3 * j + k] = total
     find_places(w)
+    for j in range(3):
+        w[_SPRING_GN + j] = _times(_R_GNG, SPRING, j, w)
     x, y, z = w[_OTHER], w[_OTHER + 1], w[_OTHER + 2]
     for k in range(PLACES):
         w[ARM + 3 * k] += x
@@ -433,7 +436,7 @@ def _set_places(w: np.ndarray) -> None:
 def _set_without_contact(h: float, w: np.ndarray) -> None:
     """Sets A and b of the step without contact, still of joints: A v+ = b."""
     for j in range(3):
-        w[_OTHER + j] = _cross(_P_TOBO, _F_GN, j, w)
+        w[_OTHER + j] = _cross(_P_TOBO, _F_GN, j, w) + w[_SPRING_GN + j]
     for j in range(6):
         K, D = w[_K + j], w[_D + j]
         pull = K * (w[_AHEAD + j] - w[_Q + j]) + D * w[_AHEAD + 6 + j]
@@ -615,18 +618,13 @@ def _add_contacts(
 
 @compiled
 def _set_inward(twist: int, w: np.ndarray) -> None:
-    """Sets at what rate each place goes into the groove [m/s]; see `NORMALS`."""
-    vx, vy, vz = w[twist], w[twist + 1], w[twist + 2]
-    wx, wy, wz = w[twist + 3], w[twist + 4], w[twist + 5]
-    for k in range(_STOPS):
-        x, y = w[ARM + 3 * k], w[ARM + 3 * k + 1]
-        w[_INWARD + k] = -_SIDES[k] * (vz + (wx * y - wy * x))
-    for k in range(_STOPS, _PLANES):
-        y, z = w[ARM + 3 * k + 1], w[ARM + 3 * k + 2]
-        w[_INWARD + k] = -_SIDES[k] * (vx + (wy * z - wz * y))
-    for k in range(_PLANES, PLACES):
-        x, z = w[ARM + 3 * k], w[ARM + 3 * k + 2]
-        w[_INWARD + k] = -_SIDES[k] * (vy + (wz * x - wx * z))
+    """Sets at what rate each place goes into the fixed body [m/s]."""
+    for k in range(PLACES):
+        arm, normal, rate = ARM + 3 * k, NORMAL + 3 * k, 0.0
+        for axis in range(3):
+            v = w[twist + axis] + _cross(twist + 3, arm, axis, w)
+            rate += w[normal + axis] * v
+        w[_INWARD + k] = -rate
 
 
 @compiled
@@ -639,16 +637,17 @@ def _push(k: int, F: float, dF: float, w: np.ndarray) -> None:
         dF: by which it falls with the velocity along the normal [N s/m].
         w: workspace.
     """
-    axis = _AXES[k]
-    w[_FORCE + axis] = _SIDES[k] * F
-    for j in range(3):
-        w[_BY_TWIST + 6 * axis + j] = 0.0
-    w[_BY_TWIST + 7 * axis] = -dF
+    normal = NORMAL + 3 * k
+    for i in range(3):
+        n = w[normal + i]
+        w[_FORCE + i] = n * F
+        for j in range(3):
+            w[_BY_TWIST + 6 * i + j] = -n * dF * w[normal + j]
 
 
 @compiled
 def _rub(k: int, twist: int, limit: float, by_rate: float, w: np.ndarray) -> None:
-    """Sets the friction at a place, and its slope by the place's velocity.
+    """Adds the friction at a place, and its slope by the place's velocity.
 
     Coulomb's, regularised: limit s / sqrt(s^2 + stiction^2) against the slip s.
 
@@ -659,19 +658,23 @@ def _rub(k: int, twist: int, limit: float, by_rate: float, w: np.ndarray) -> Non
         by_rate: by which that falls with the velocity along the normal [N s/m].
         w: workspace.
     """
-    axis = _AXES[k]
-    one, other = (axis + 1) % 3, (axis + 2) % 3
-    u = w[twist + one] + _cross(twist + 3, ARM + 3 * k, one, w)
-    v = w[twist + other] + _cross(twist + 3, ARM + 3 * k, other, w)
-    speed = math.sqrt(u**2 + v**2 + _STICTION**2)
-    drag, along, across = limit / speed, u / speed, v / speed
-    w[_FORCE + one], w[_FORCE + other] = -drag * u, -drag * v
-    side = _SIDES[k] * by_rate
-    row, next_row = _BY_TWIST + 6 * one, _BY_TWIST + 6 * other
-    w[row + axis], w[next_row + axis] = side * along, side * across
-    w[row + one] = drag * (along * along - 1.0)
-    w[next_row + other] = drag * (across * across - 1.0)
-    w[row + other] = w[next_row + one] = drag * along * v / speed
+    arm, normal, along, squares = ARM + 3 * k, NORMAL + 3 * k, 0.0, 0.0
+    for i in range(3):
+        w[_SLIP + i] = w[twist + i] + _cross(twist + 3, arm, i, w)
+        along += w[normal + i] * w[_SLIP + i]
+    for i in range(3):
+        w[_SLIP + i] -= along * w[normal + i]
+        squares += w[_SLIP + i] * w[_SLIP + i]
+    speed = math.sqrt(squares + _STICTION**2)
+    drag = limit / speed
+    for i in range(3):
+        share, n, row = w[_SLIP + i] / speed, w[normal + i], _BY_TWIST + 6 * i
+        w[_FORCE + i] -= drag * w[_SLIP + i]
+        for j in range(3):
+            across = n * w[normal + j] + share * w[_SLIP + j] / speed
+            if i == j:
+                across -= 1.0
+            w[row + j] += by_rate * share * w[normal + j] + drag * across
 
 
 @compiled
@@ -813,20 +816,40 @@ def normal_force(
 
 @compiled
 def find_places(w: np.ndarray) -> None:
-    """Finds the places where bolt and groove could touch.
+    """Finds the places where the moved and the fixed body could touch.
 
-    Sets how deep they are in each other [m], negative where there is a gap, and arms
-    from Bo to the places in G [m].
+    Sets how deep they are in each other [m], negative where there is a gap, arms from
+    Bo to the places, and normals, in G; and the torque of the part's spring.
 
     Args:
-        w: workspace, with R_GB and p_GBo, and the dimensions of `LockShape`.
+        w: workspace, with R_GB and p_GBo, and a row of `Gaps`.
     """
-    slot, wall, lips_end = w[LOCK], w[LOCK + 1], w[LOCK + 2]
-    lip, under_lip, floor = w[LOCK + 3], w[LOCK + 4], w[LOCK + 5]
-    start, end, neck = w[LOCK + 6], w[LOCK + 7], w[LOCK + 8]
-    head, top, bottom = w[LOCK + 9], w[LOCK + 10], w[LOCK + 11]
+    for j in range(3):
+        w[SPRING + j] = 0.0
+    kind = w[GAPS]
+    if kind == SLOT:
+        _find_slot(w)
+        return
+    for k in range(PLACES):
+        _put(k, -1.0, 0.0, 0.0, 0.0, w)
+        _face(k, 0.0, 0.0, 0.0, w)
+    if kind == HOLE:
+        _find_hole(w)
+    else:
+        _find_bayonet(w)
+
+
+@compiled
+def _find_slot(w: np.ndarray) -> None:
+    """Finds the places of `SlotGaps`."""
+    slot, wall, lips_end = w[GAPS + 1], w[GAPS + 2], w[GAPS + 3]
+    lip, under_lip, floor = w[GAPS + 4], w[GAPS + 5], w[GAPS + 6]
+    start, end, neck = w[GAPS + 7], w[GAPS + 8], w[GAPS + 9]
+    head, top, bottom = w[GAPS + 10], w[GAPS + 11], w[GAPS + 12]
     px, py, pz = w[P_GBO], w[P_GBO + 1], w[P_GBO + 2]
     ux, uy, uz = w[R_GB + 1], w[R_GB + 4], w[R_GB + 7]
+    for k in range(PLACES):
+        _face(k, _SLOT_NORMALS[k, 0], _SLOT_NORMALS[k, 1], _SLOT_NORMALS[k, 2], w)
     middle = (top + bottom) / 2.0
     _circle_between(lip, pz + lip * uz, 2, neck, slot, 0, w)
     _circle_between(-lip, pz - lip * uz, 2, neck, slot, 2, w)
@@ -835,8 +858,8 @@ def find_places(w: np.ndarray) -> None:
     if px - lip * ux >= lips_end:
         w[DEPTH + 2] = w[DEPTH + 3] = -1.0
     _circle_between(middle, pz + middle * uz, 2, head, wall, 4, w)
-    _circle_between(middle, px + middle * ux, 0, head, end, 6, w)
-    w[DEPTH + 7] = start - (px + middle * ux - head)
+    _circle_between(middle, px + middle * ux, 0, head, end, _STOPS, w)
+    w[DEPTH + _STOPS + 1] = start - (px + middle * ux - head)
     xx, yx, zx = w[R_GB], w[R_GB + 3], w[R_GB + 6]
     xz, yz, zz = w[R_GB + 2], w[R_GB + 5], w[R_GB + 8]
     for i in range(_RIM_POINTS):
@@ -845,14 +868,13 @@ def find_places(w: np.ndarray) -> None:
         x = head * (xx * along + xz * across)
         y = head * (yx * along + yz * across)
         z = head * (zx * along + zz * across)
-        w[ARM + 3 * below], w[ARM + 3 * below + 1] = x + bottom * ux, y + bottom * uy
-        w[ARM + 3 * below + 2] = z + bottom * uz
-        w[DEPTH + below] = floor - (py + (y + bottom * uy))
+        depth = floor - (py + (y + bottom * uy))
+        _put(below, depth, x + bottom * ux, y + bottom * uy, z + bottom * uz, w)
         x, y, z = x + top * ux, y + top * uy, z + top * uz
-        w[ARM + 3 * above], w[ARM + 3 * above + 1], w[ARM + 3 * above + 2] = x, y, z
         is_covered = px + x < lips_end and abs(pz + z) > slot
         is_inside = py + y < under_lip + head  # not yet lifted out
-        w[DEPTH + above] = py + y - under_lip if is_covered and is_inside else -1.0
+        depth = py + y - under_lip if is_covered and is_inside else -1.0
+        _put(above, depth, x, y, z, w)
 
 
 @compiled
@@ -882,3 +904,196 @@ def _circle_between(
         for axis in range(3):
             w[arm + axis] = height * w[R_GB + 3 * axis + 1]
         w[arm + along] += sign * radius
+
+
+@compiled
+def _put(k: int, depth: float, x: float, y: float, z: float, w: np.ndarray) -> None:
+    """Sets a place's depth [m], and its arm from Bo in G [m]."""
+    w[DEPTH + k] = depth
+    w[ARM + 3 * k], w[ARM + 3 * k + 1], w[ARM + 3 * k + 2] = x, y, z
+
+
+@compiled
+def _face(k: int, x: float, y: float, z: float, w: np.ndarray) -> None:
+    """Sets a place's normal in G."""
+    w[NORMAL + 3 * k], w[NORMAL + 3 * k + 1], w[NORMAL + 3 * k + 2] = x, y, z
+
+
+@compiled
+def _arm(x: float, y: float, z: float, axis: int, w: np.ndarray) -> float:
+    """Returns an element of a point of the moved body, from Bo in G [m]."""
+    row = R_GB + 3 * axis
+    return float(w[row] * x + w[row + 1] * y + w[row + 2] * z)
+
+
+@compiled
+def _point(k: int, x: float, y: float, z: float, w: np.ndarray) -> None:
+    """Sets a place's arm to a point of the moved body, given in B [m]."""
+    for axis in range(3):
+        w[ARM + 3 * k + axis] = _arm(x, y, z, axis, w)
+
+
+@compiled
+def _height_at(level: float, w: np.ndarray) -> float:
+    """Returns y in B of the axis where it is at a level of G [m]."""
+    return float((level - w[P_GBO + 1]) / w[R_GB + 4])
+
+
+@compiled
+def _circle_in_hole(
+    k: int, height: float, radius: float, hole: float, w: np.ndarray
+) -> None:
+    """Sets the place where a circle about the axis is nearest to a round hole's wall.
+
+    Args:
+        k: number of the place.
+        height: of the circle above Bo [m].
+        radius, hole: [m].
+        w: workspace, with R_GB and p_GBo.
+    """
+    for axis in range(3):
+        w[_ONE + axis] = height * w[R_GB + 3 * axis + 1]
+    x, z = w[P_GBO] + w[_ONE], w[P_GBO + 2] + w[_ONE + 2]
+    away = math.sqrt(x * x + z * z)
+    if away > 0.0:
+        x, z = x / away, z / away
+    else:
+        x, z = 1.0, 0.0
+    arm_x, arm_z = w[_ONE] + radius * x, w[_ONE + 2] + radius * z
+    _put(k, away + radius - hole, arm_x, w[_ONE + 1], arm_z, w)
+    _face(k, -x, 0.0, -z, w)
+
+
+@compiled
+def _square_in_hole(
+    first: int, height: float, half: float, hole: float, w: np.ndarray
+) -> None:
+    """Sets eight places, where the corners of a square meet a square hole's walls.
+
+    Args:
+        first: number of the first.
+        height: of the square above Bo [m].
+        half, hole: half widths [m].
+        w: workspace, with R_GB and p_GBo.
+    """
+    for corner in range(4):
+        x, z = 1.0 - 2.0 * (corner % 2), 1.0 - 2.0 * (corner // 2)
+        for side in range(2):
+            k, axis, sign = first + 2 * corner + side, 2 * side, x if side == 0 else z
+            _point(k, half * x, height, half * z, w)
+            w[DEPTH + k] = sign * (w[P_GBO + axis] + w[ARM + 3 * k + axis]) - hole
+            w[NORMAL + 3 * k + axis] = -sign
+
+
+@compiled
+def _find_hole(w: np.ndarray) -> None:
+    """Finds the places of `HoleGaps`: at the peg's tip, at the mouth, on the floor."""
+    is_square, half, hole = w[GAPS + 1] > 0.0, w[GAPS + 2], w[GAPS + 3]
+    tip, floor = w[GAPS + 4], w[GAPS + 5]
+    if w[P_GBO + 1] + tip * w[R_GB + 4] >= 0.0:  # it is out
+        return
+    mouth = _height_at(0.0, w)
+    if is_square:
+        _square_in_hole(0, tip, half, hole, w)
+        _square_in_hole(8, mouth, half, hole, w)
+    else:
+        _circle_in_hole(0, tip, half, hole, w)
+        _circle_in_hole(1, mouth, half, hole, w)
+    first, reach = PLACES - _RIM_POINTS, half
+    if is_square:
+        reach = half * math.sqrt(2.0)
+    for i in range(_RIM_POINTS):
+        if is_square and i % 2 == 0:
+            continue  # its corners are between
+        _point(first + i, reach * _RIM[i, 0], tip, reach * _RIM[i, 1], w)
+        _face(first + i, 0.0, 1.0, 0.0, w)
+        w[DEPTH + first + i] = floor - w[P_GBO + 1] - w[ARM + 3 * (first + i) + 1]
+
+
+@compiled
+def _find_bayonet(w: np.ndarray) -> None:
+    """Finds the places of `BayonetGaps`, and its detent's torque.
+
+    The shaft in the plate's hole; on each lug, by its number, corners under the plate,
+    on the floor, at the stop, and in the notch.
+    """
+    shaft, hole, plate = w[GAPS + 1], w[GAPS + 2], w[GAPS + 3]
+    low = w[P_GBO + 1] + w[GAPS + 8]
+    detent, width = w[GAPS + 14], w[GAPS + 15]
+    angle = math.atan2(w[R_GB + 2] - w[R_GB + 6], w[R_GB] + w[R_GB + 8])
+    if abs(angle) < width:
+        w[SPRING + 1] = -detent * math.sin(math.pi * angle / width)
+    for k in range(2):
+        level = -plate * k
+        if low < level:
+            _circle_in_hole(k, _height_at(level, w), shaft, hole, w)
+    for lug in range(2):
+        sign = 1.0 - 2.0 * lug
+        for corner in range(4):
+            _lug_under_plate(2 + 4 * lug + corner, sign, corner, w)
+        for corner in range(2):
+            _lug_on_floor(10 + 2 * lug + corner, sign, corner, w)
+            _lug_at_stop(14 + 2 * lug + corner, sign, corner, w)
+            _lug_in_notch(18 + 2 * lug + corner, sign, corner, w)
+
+
+@compiled
+def _across_notch(k: int, w: np.ndarray) -> float:
+    """Returns how far a place is from the middle of the notches, signed [m]."""
+    x, z = w[P_GBO] + w[ARM + 3 * k], w[P_GBO + 2] + w[ARM + 3 * k + 2]
+    return float(w[GAPS + 10] * x + w[GAPS + 9] * z)
+
+
+@compiled
+def _along_notch(k: int, w: np.ndarray) -> float:
+    """Returns how far out along the notches a place is, signed [m]."""
+    x, z = w[P_GBO] + w[ARM + 3 * k], w[P_GBO + 2] + w[ARM + 3 * k + 2]
+    return float(w[GAPS + 9] * x - w[GAPS + 10] * z)
+
+
+@compiled
+def _lug_under_plate(k: int, sign: float, corner: int, w: np.ndarray) -> None:
+    """Sets a place where a lug's upper face, from hole to end, meets the plate."""
+    hole, plate, end, half = w[GAPS + 2], w[GAPS + 3], w[GAPS + 5], w[GAPS + 6]
+    top, half_notch, notch_end = w[GAPS + 7], w[GAPS + 11], w[GAPS + 12]
+    reach = end if corner < 2 else hole
+    _point(k, sign * reach, top, half * (1.0 - 2.0 * (corner % 2)), w)
+    _face(k, 0.0, -1.0, 0.0, w)
+    depth = w[P_GBO + 1] + w[ARM + 3 * k + 1] + plate
+    beside = abs(_across_notch(k, w)) - half_notch
+    is_in_notch = abs(_along_notch(k, w)) < notch_end and beside < max(0.0, depth)
+    w[DEPTH + k] = -1.0 if is_in_notch or depth > plate / 2.0 else depth
+
+
+@compiled
+def _lug_on_floor(k: int, sign: float, corner: int, w: np.ndarray) -> None:
+    """Sets a place where the end of a lug's lower face meets the floor."""
+    _point(k, sign * w[GAPS + 5], w[GAPS + 8], w[GAPS + 6] * (1.0 - 2.0 * corner), w)
+    _face(k, 0.0, 1.0, 0.0, w)
+    w[DEPTH + k] = w[GAPS + 4] - w[P_GBO + 1] - w[ARM + 3 * k + 1]
+
+
+@compiled
+def _lug_at_stop(k: int, sign: float, corner: int, w: np.ndarray) -> None:
+    """Sets a place where a lug's side meets its stop, under the plate."""
+    hole, plate, end, half = w[GAPS + 2], w[GAPS + 3], w[GAPS + 5], w[GAPS + 6]
+    middle = (w[GAPS + 7] + w[GAPS + 8]) / 2.0
+    reach = end if corner == 0 else hole
+    _point(k, sign * reach, middle, -sign * half, w)
+    _face(k, sign * w[GAPS + 10], 0.0, sign * w[GAPS + 9], w)
+    if w[P_GBO + 1] + middle < -plate:
+        w[DEPTH + k] = -sign * _across_notch(k, w) - w[GAPS + 13]
+
+
+@compiled
+def _lug_in_notch(k: int, sign: float, corner: int, w: np.ndarray) -> None:
+    """Sets a place where a lug's end meets a side of its notch, as it is lifted."""
+    plate, end, half, top = w[GAPS + 3], w[GAPS + 5], w[GAPS + 6], w[GAPS + 7]
+    bottom, half_notch, py = w[GAPS + 8], w[GAPS + 11], w[P_GBO + 1]
+    side = 1.0 - 2.0 * corner
+    middle = (max(py + bottom, -plate) + min(py + top, 0.0)) / 2.0
+    _point(k, sign * end, middle - py, side * half, w)
+    _face(k, -side * w[GAPS + 10], 0.0, -side * w[GAPS + 9], w)
+    depth = side * _across_notch(k, w) - half_notch
+    is_raised = py + top + plate > max(0.0, depth) and py + bottom < 0.0
+    w[DEPTH + k] = depth if is_raised else -1.0

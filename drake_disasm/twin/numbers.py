@@ -22,7 +22,7 @@ from drake_disasm.common.rotations import Pose
 from drake_disasm.devices.sensor_chain import Payload
 from drake_disasm.effects import Environment
 from drake_disasm.mdp import TaskGeometry, action_bounds
-from drake_disasm.parts.lock_shape import LockShape
+from drake_disasm.parts.gaps import Gaps
 from drake_disasm.scenario import Scenario, TaskConfig
 from drake_disasm.systems.imprecision import Imprecise
 from drake_disasm.systems.observation import Mounting
@@ -39,7 +39,7 @@ class TwinNumbers:
     """All that a twin is made of, except effects; of n of them, arrays (n, ...).
 
     Attributes:
-        law, shape: of the contact, at the nominal environment.
+        law, gaps: of the contact, at the nominal environment.
         M: (6, 6) mass matrix of the twin's joints at their zero.
         arm: a step of it.
         grip: springs between arm and bolt.
@@ -53,7 +53,7 @@ class TwinNumbers:
     """
 
     law: ImpactLaw
-    shape: LockShape
+    gaps: Gaps
     M: Array
     arm: ArmStep
     grip: Springs
@@ -81,7 +81,7 @@ class TwinNumbers:
         part, bounds = scenario.part, action_bounds(scenario.task)
         return cls(
             law=ImpactLaw.of(scenario.contact.impact),
-            shape=part.required_gaps(),
+            gaps=part.required_gaps(),
             M=rigid.M,
             arm=rigid.arm,
             grip=rigid.grip,

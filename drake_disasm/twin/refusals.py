@@ -23,6 +23,7 @@ from drake_disasm.scenario import Scenario, corner, validate
 
 #: What all environments of a batch share, by the name of the field.
 _SHARED: dict[str, Callable[[Scenario], Any]] = {
+    "part": lambda s: type(s.part).__name__,
     "task.period": lambda s: s.task.period,
     "task.success": lambda s: s.task.success,
     "task.judged_by": lambda s: s.task.judged_by,

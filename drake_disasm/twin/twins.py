@@ -55,7 +55,7 @@ class Twins:
         K, D = in_joint_order(numbers.arm.springs)
         conditions = ImpactConditions.of(
             numbers.law,
-            numbers.shape,
+            numbers.gaps,
             self.environment(motion),
             motion.p,
             M=numbers.M,

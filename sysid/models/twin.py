@@ -457,17 +457,10 @@ def _kept(found: dict[str, _T], key: str, compute: Callable[[], _T]) -> _T:
 
 
 def _with_impact_as_stiff(scenario: Scenario) -> Scenario:
-    """Returns a scenario with IMPACT contact about as stiff as its hydroelastic one.
-
-    That is the head's, the softer part, with its edge against a wall: an elastic
-    foundation as deep as the radius under diameter times thickness, k = 2 E t. On three
-    logs of the cell that is near the best there is (docs/results/verdicts-blind.md).
-    """
+    """Returns a scenario with IMPACT contact about as stiff as its hydroelastic one."""
     contact = scenario.contact
     most = find_field(scenario, "contact.impact.stiffness").metadata["high"]
-    gaps = scenario.part.required_gaps()
-    thickness = float(gaps.top - gaps.bottom)
-    stiffness = 2.0 * contact.head_modulus * thickness * _N_PER_MM
+    stiffness = _N_PER_MM * scenario.part.impact_stiffness(contact)
     impact = dataclasses.replace(
         contact.impact, stiffness=min(stiffness, most), exponent=1.0
     )

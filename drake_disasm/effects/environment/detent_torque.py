@@ -20,7 +20,6 @@ class DetentTorque(EnvironmentEffect):
 
     log_factor: float = amplitude("1", -2.0, 2.0, "natural logarithm of the factor")
 
-    contact_models = ("hydroelastic",)
     of_part: ClassVar[str] = "Bayonet"
     noun = "another torque of the detent"
     experiment = "slow turns out of the detent and back, without a pull"

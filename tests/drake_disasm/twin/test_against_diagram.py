@@ -103,7 +103,7 @@ def test_all_effects_on_the_twin_are_here():
     known = {type(effect) for effect in EFFECTS} | {ef.SensorResidualModel}
     shipped = {e for e in ef.registered_effects() if e.__module__.startswith("drake_")}
     on_twin = {e for e in shipped if not issubclass(e, ArmEffect | PoseEffect)}
-    on_twin -= {ef.DetentTorque}  # batches have the door chain alone
+    on_twin -= {ef.DetentTorque}  # of a part below
     assert known == on_twin, "give the new effect a size in sizes.py"
 
 
@@ -113,6 +113,37 @@ def test_a_learned_effect_is_the_diagrams(tmp_path):
     found = _batch([scenario, TURNED], moves)
     _assert_same(found[:, 0], _diagram(scenario, moves))
     assert np.abs(found[:, 0] - found[:, 1]).max() > 0.1
+
+
+PEG = [[0.0, 1e-3, 0.0, 0.0, 0.0, 0.0]] * 24
+TURN = [[0.0, 0.0, 0.0, 0.0, 0.016, 0.0]] * 64
+LIFT = [[0.0, 4e-4, 0.0, 0.0, 0.0, 0.0]] * 18
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "effects", "way"),
+    [
+        ("iiwa_peg", [], [ef.GroovePose(z=2e-4, rx=0.01)], PEG),
+        ("iiwa_peg", ["part.cross_section=square"], [ef.GroovePose(ry=0.01)], PEG),
+        (
+            "iiwa_bayonet",
+            [],
+            [ef.DetentTorque(0.3), ef.GroovePose(x=2e-4)],
+            TURN + LIFT,
+        ),
+    ],
+    ids=["round", "square", "bayonet"],
+)
+def test_other_parts_are_the_diagrams(name, settings, effects, way):
+    """On the way out, swayed from wall to wall."""
+    scenario = load_scenario(name, [*SETTINGS[:4], *settings])
+    scenario = dataclasses.replace(scenario, effects=effects)
+    moves, turn = np.array(way), 0.8 * np.arange(len(way))
+    moves[:, 0] += 2e-3 * np.sin(turn)
+    moves[:, 2] += 2e-3 * np.cos(turn)
+    expected, found = _diagram(scenario, moves), _batch([scenario], moves)[:, 0]
+    assert np.linalg.norm(expected[:, 6:9], axis=1).max() > 1.0
+    _assert_same(found, expected)
 
 
 @pytest.mark.parametrize(

@@ -92,7 +92,7 @@ def test_an_episode_ends_as_with_hydroelastic_contact():
 def test_a_step_without_a_balance_is_an_error():
     conditions = ImpactConditions(
         law=ImpactLaw(100.0, 1.5, 1.0, 0.1),
-        shape=DoorChain().gaps,
+        gaps=DoorChain().gaps,
         around=Surroundings(np.zeros(1), np.eye(3)[None], *np.zeros((2, 1, 3))),
         M=np.eye(6),
         K=np.ones(6),

@@ -17,7 +17,7 @@ M = np.diag([3.0, 3.0, 3.0, 0.02, 0.02, 0.02])
 K, D = np.array([15e3] * 3 + [150.0] * 3), np.array([400.0] * 3 + [3.0] * 3)
 TURNED = ImpactConditions(
     law=ImpactLaw(300.0, 1.4, 2.0, 0.1),
-    shape=DoorChain().gaps,
+    gaps=DoorChain().gaps,
     around=Surroundings(
         np.array([0.2]),
         RollPitchYaw(0.0, 0.03, 0.0).ToRotationMatrix().matrix()[None],
@@ -117,6 +117,9 @@ def touching(random):
     depth = np.where(random.uniform(size=count) < 0.2, 2e-5, -1.0)
     part(w, equations.DEPTH, count)[:] = depth
     part(w, equations.ARM, 3 * count)[:] = random.uniform(-0.01, 0.01, 3 * count)
+    normals = random.normal(size=(count, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    part(w, equations.NORMAL, 3 * count)[:] = np.ravel(normals)
     part(w, equations.LAW, 4)[:] = TURNED.law.row
     part(w, equations.A, 36)[:] = np.ravel(M + H * np.diag(D))
     part(w, equations.B, 6)[:], w[equations.FRICTION] = 0.0, 0.2

@@ -1,0 +1,161 @@
+"""The gaps of parts: where the bodies touch."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+from drake_disasm.parts import Bayonet, ContactConfig, DoorChain, PegInHole
+from drake_disasm.twin.equations import (
+    ARM,
+    DEPTH,
+    GAPS,
+    NORMAL,
+    P_GBO,
+    PLACES,
+    R_GB,
+    SIZE,
+    SPRING,
+    find_places,
+)
+
+MM = 1e-3
+
+
+def places(R, p):
+    w = np.full(SIZE, np.nan)
+    for place, numbers in (
+        (GAPS, DoorChain().gaps.row),
+        (R_GB, R),
+        (P_GBO, p),
+    ):
+        w[place : place + np.size(numbers)] = np.ravel(numbers)
+    find_places(w)
+    arms, normals = (w[at : at + 3 * PLACES].reshape(-1, 3) for at in (ARM, NORMAL))
+    return w[DEPTH : DEPTH + PLACES], arms, normals
+
+
+def deepest(position):
+    depth, _, normals = places(np.eye(3), np.array(position) * MM)
+    i = int(np.argmax(depth))
+    return depth[i] / MM, normals[i]
+
+
+def test_in_the_middle_and_at_the_keyhole_nothing_touches():
+    assert deepest([20.0, 0.0, 0.0])[0] == pytest.approx(-0.2)  # half the clearance
+    assert deepest([60.0, 10.0, 0.4])[0] < 0.0
+
+
+@pytest.mark.parametrize(
+    ("position", "depth", "normal"),
+    [
+        ([20.0, 0.0, 0.25], 0.05, [0, 0, -1]),  # neck on the lip at +z
+        ([20.0, 0.0, -0.3], 0.1, [0, 0, 1]),
+        ([20.0, 0.25, 0.0], 0.05, [0, -1, 0]),  # head under the lips
+        ([20.0, -0.3, 0.0], 0.1, [0, 1, 0]),  # head on the floor
+        ([60.6, 0.0, 0.0], 0.1, [-1, 0, 0]),  # head at stop B
+        ([-0.7, 0.0, 0.0], 0.2, [1, 0, 0]),  # head at stop A
+    ],
+)
+def test_touches_where_the_lock_is(position, depth, normal):
+    found, direction = deepest(position)
+    assert found == pytest.approx(depth, abs=1e-9)
+    np.testing.assert_array_equal(direction, normal)
+
+
+def test_a_quarter_turn_changes_nothing_for_a_round_bolt():
+    """Its rim has eight points, so they take each other's places."""
+    quarter = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    straight, turned = (places(R, [0.02, 0.0, 1e-4]) for R in (np.eye(3), quarter))
+    np.testing.assert_allclose(np.sort(turned[0]), np.sort(straight[0]), atol=1e-12)
+    lengths = (np.sort(np.linalg.norm(each[1], axis=1)) for each in (straight, turned))
+    np.testing.assert_allclose(*lengths)
+
+
+def test_another_clearance_is_the_lock_s_with_that_clearance():
+    wide = DoorChain(clearance=6e-4).gaps
+    narrow = DoorChain(clearance=2e-4).gaps.with_clearance(6e-4)
+    assert narrow.slot == pytest.approx(wide.slot, abs=1e-12)
+    assert wide.slot - wide.neck == pytest.approx(3e-4, abs=1e-12)
+
+
+def touching(part, p, R=None):
+    """Returns depths [mm] and normals of the places that touch, and the spring's."""
+    w = np.full(SIZE, np.nan)
+    R = np.eye(3) if R is None else R
+    for place, numbers in ((GAPS, part.gaps.row), (R_GB, R), (P_GBO, p)):
+        w[place : place + np.size(numbers)] = np.ravel(numbers)
+    find_places(w)
+    depth = w[DEPTH : DEPTH + PLACES]
+    normals = w[NORMAL : NORMAL + 3 * PLACES].reshape(-1, 3)
+    return depth[depth > 0] / MM, normals[depth > 0], w[SPRING : SPRING + 3]
+
+
+@pytest.mark.parametrize("section", ["round", "square"])
+def test_a_peg_touches_at_its_tip_and_at_the_mouth(section):
+    """0.1 mm of play to either side; 20 mm deep."""
+    peg, corners = PegInHole(cross_section=section), 2 if section == "square" else 1
+    assert not touching(peg, [0.0, 0.0, 0.09 * MM])[0].size
+    depth, normals, _ = touching(peg, [0.0, 5.0 * MM, 0.12 * MM])
+    np.testing.assert_allclose(depth, [0.02] * 2 * corners, atol=1e-9)
+    np.testing.assert_allclose(normals, [[0, 0, -1]] * 2 * corners, atol=1e-9)
+    assert not touching(peg, [0.0, 21.0 * MM, 1.0 * MM])[0].size  # it is out
+    # Tilted by more than the play to either side it touches on both: they are 10 mm
+    # from the middle of the depth, by which the hole's mouth is seen shorter.
+    tilt = RollPitchYaw(0.012, 0.0, 0.0).ToRotationMatrix()
+    middle = np.array([0.0, -10.0 * MM, 0.0])
+    depth, normals, _ = touching(peg, middle - tilt @ middle, tilt.matrix())
+    np.testing.assert_allclose(depth, [0.02] * 2 * corners, atol=2e-3)
+    np.testing.assert_allclose(np.abs(normals[:, 2]), 1.0)
+    assert set(np.sign(normals[:, 2])) == {-1.0, 1.0}
+
+
+def test_a_peg_rests_on_the_floor():
+    """Which is 1 mm under its tip."""
+    for section, count in (("round", 8), ("square", 4)):
+        depth, normals, _ = touching(
+            PegInHole(cross_section=section), [0, -1.1 * MM, 0]
+        )
+        np.testing.assert_allclose(depth, [0.1] * count)
+        np.testing.assert_allclose(normals, [[0, 1, 0]] * count)
+
+
+@pytest.mark.parametrize(
+    ("turn", "p", "depth", "normal", "count"),
+    [
+        (-0.3, [0.0, 0.35, 0.0], 0.05, [0, -1, 0], 8),  # lugs under the plate
+        (0.5, [0.0, -0.4, 0.0], 0.1, [0, 1, 0], 4),  # and on the floor
+        (0.0, [0.17, 0.0, 0.0], 0.02, [-1, 0, 0], 2),  # shaft in the hole
+    ],
+)
+def test_a_bayonet_touches_where_its_lugs_are(turn, p, depth, normal, count):
+    R = RotationMatrix.MakeYRotation(turn).matrix()
+    found, normals, _ = touching(Bayonet(), np.array(p) * MM, R)
+    np.testing.assert_allclose(found, [depth] * count, atol=1e-9)
+    np.testing.assert_allclose(normals, [normal] * count, atol=1e-9)
+
+
+def test_the_lugs_meet_the_stops_and_pass_the_notches():
+    """Stops 0.2 mm, the notches' sides 0.4 mm beside the lugs when turned by 1 rad."""
+    part = Bayonet()
+    R = RotationMatrix.MakeYRotation(part.turn)
+    for lift in (0.35, 3.0, 7.0):
+        assert not touching(part, [0.0, lift * MM, 0.0], R.matrix())[0].size
+    beyond = RotationMatrix.MakeYRotation(part.turn + 0.26 / 8.0).matrix()
+    depth, normals, _ = touching(part, [0.0, 0.0, 0.0], beyond)
+    at_end, further_in = 0.06, 0.26 * 4.15 / 8.0 - 0.2
+    np.testing.assert_allclose(depth.max(), at_end, atol=2e-3)
+    assert further_in < 0.0 and len(depth) == 2
+    expected = R.matrix() @ [0.0, 0.0, 1.0]
+    np.testing.assert_allclose(normals, [expected, -expected])
+    turned = RotationMatrix.MakeYRotation(part.turn + 0.46 / 8.0).matrix()
+    depth, normals, _ = touching(part, [0.0, 3.0 * MM, 0.0], turned)
+    np.testing.assert_allclose(depth, [0.06, 0.06], atol=5e-3)
+    np.testing.assert_allclose(normals, [expected, -expected])
+
+
+@pytest.mark.parametrize("angle", [-0.1, 0.05, 0.25])
+def test_the_detent_is_the_spring_of_the_part(angle):
+    part, R = Bayonet(), RotationMatrix.MakeYRotation(angle)
+    environment = part.environment(ContactConfig())
+    expected = part.spring_wrench(RigidTransform(R, np.zeros(3)), environment)
+    np.testing.assert_allclose(touching(part, np.zeros(3), R.matrix())[2], expected[3:])
