@@ -1,7 +1,8 @@
 """What closing the loop says of logs of the cell: no effect hidden, or one in each.
 
-Records each log (`removal`, `admittance` with 0.15 mm of exploration, 440 transitions)
-and judges it by the twin of the same scenario. Run `null` first: effects are four to
+Records each log (of a scenario, `removal` unless another is given, `admittance` with
+0.15 mm of exploration, 440 transitions) and judges it by the twin of the same
+scenario, whose contact may be IMPACT. Run `null` first: effects are four to
 ten times as large as the first null log would show with 80 % probability. `strong`
 ones are a drag of 600 N s/m and a patch of friction of 1.0, in turn, in logs of the
 twin itself with IMPACT contact (200 transitions): where its stated error ends.
@@ -52,6 +53,8 @@ _EXAMPLES = """examples:
   python benchmarks/cell_verdicts.py null --logs 50
   python benchmarks/cell_verdicts.py effect --logs 50 --time-budget 30
   python benchmarks/cell_verdicts.py strong --logs 20 --time-budget 30
+  python benchmarks/cell_verdicts.py null --scenario iiwa_bayonet --contact impact \\
+      --out out/bayonet_verdicts
 """
 
 
@@ -116,8 +119,10 @@ def _case(
 ) -> Answer:
     """Returns the answer to a case, within a time [s], with what was put in."""
     real, hidden, name = copy.deepcopy(scenario), "", ""
+    is_strong = kind == "strong"
+    if not is_strong:
+        real.contact.model = "hydroelastic"  # the only one that the cell has
     if kind != "null":
-        is_strong = kind == "strong"
         limits = [] if is_strong else _limits(out / "null.jsonl")
         effect = strong(number) if is_strong else draw(number, limits)
         real.effects, hidden, name = [effect], repr(effect), type(effect).__name__
@@ -165,11 +170,19 @@ def main(arguments: Sequence[str]) -> int:
         metavar="MIN",
         help="of each log; its answer may be provisional, and stays (default: none)",
     )
+    parser.add_argument(
+        "--scenario", default="removal", metavar="NAME|FILE", help="default: removal"
+    )
+    parser.add_argument(
+        "--contact",
+        choices=("hydroelastic", "impact"),
+        help="of the twin that judges (default: the scenario's; strong: impact)",
+    )
     add_arguments(parser, 50, "cell_verdicts")
     args = parser.parse_args(arguments)
-    scenario, path = load_scenario("removal"), args.out / f"{args.kind}.jsonl"
-    if args.kind == "strong":
-        scenario.contact.model = "impact"
+    scenario, path = load_scenario(args.scenario), args.out / f"{args.kind}.jsonl"
+    contact = args.contact or ("impact" if args.kind == "strong" else None)
+    scenario.contact.model = contact or scenario.contact.model
     seconds = 60.0 * args.time_budget
     answers = complete(
         path,
