@@ -88,9 +88,10 @@ _ACTING, _THREE = _SIX + 60, _SIX + 66
 )
 (_SLIP, _BY_TWIST, _PLACES) = (_THREE + 30 + place for place in (0, 3, 21))
 #: ... of the places (k,): how deep they are, how fast they go in, which normal force
-#: lagged friction is of; (k, 3) arms from To, and normals out of the fixed body, in G.
-(DEPTH, _INWARD, PRESSED, ARM, NORMAL, SIZE) = (
-    _PLACES + place for place in _begins(PLACES, PLACES, PLACES, 3 * PLACES, 3 * PLACES)
+#: lagged friction is of; (k, 3) arms from To, normals out of the fixed body, and
+#: arm x normal, in G.
+(DEPTH, _INWARD, PRESSED, ARM, NORMAL, MOMENT, SIZE) = (
+    _PLACES + PLACES * place for place in (0, 1, 2, 3, 6, 9, 12)
 )
 
 
@@ -430,6 +431,15 @@ def _set_places(w: np.ndarray) -> None:
         w[ARM + 3 * k] += x
         w[ARM + 3 * k + 1] += y
         w[ARM + 3 * k + 2] += z
+    set_moments(w)
+
+
+@compiled
+def set_moments(w: np.ndarray) -> None:
+    """Sets the moments of unit forces along the places' normals, about To."""
+    for k in range(PLACES):
+        for axis in range(3):
+            w[MOMENT + 3 * k + axis] = _cross(ARM + 3 * k, NORMAL + 3 * k, axis, w)
 
 
 @compiled
@@ -619,11 +629,12 @@ def _add_contacts(
 @compiled
 def _set_inward(twist: int, w: np.ndarray) -> None:
     """Sets at what rate each place goes into the fixed body [m/s]."""
+    vx, vy, vz = w[twist], w[twist + 1], w[twist + 2]
+    wx, wy, wz = w[twist + 3], w[twist + 4], w[twist + 5]
     for k in range(PLACES):
-        arm, normal, rate = ARM + 3 * k, NORMAL + 3 * k, 0.0
-        for axis in range(3):
-            v = w[twist + axis] + _cross(twist + 3, arm, axis, w)
-            rate += w[normal + axis] * v
+        n, m = NORMAL + 3 * k, MOMENT + 3 * k
+        rate = w[n] * vx + w[n + 1] * vy + w[n + 2] * vz
+        rate += w[m] * wx + w[m + 1] * wy + w[m + 2] * wz
         w[_INWARD + k] = -rate
 
 

@@ -120,6 +120,7 @@ def touching(random):
     normals = random.normal(size=(count, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     part(w, equations.NORMAL, 3 * count)[:] = np.ravel(normals)
+    equations.set_moments(w)
     part(w, equations.LAW, 4)[:] = TURNED.law.row
     part(w, equations.A, 36)[:] = np.ravel(M + H * np.diag(D))
     part(w, equations.B, 6)[:], w[equations.FRICTION] = 0.0, 0.2
