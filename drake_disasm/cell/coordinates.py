@@ -24,7 +24,7 @@ from drake_disasm.cell.arm_dynamics import add_frames, bolt_jacobian
 from drake_disasm.cell.arm_model import add_arm
 from drake_disasm.common.arrays import Array, apply_matrix, namespace
 from drake_disasm.common.errors import DisasmError, UnreachableError
-from drake_disasm.common.rotations import Pose, matrices_of_rpy, rpy_of_matrices
+from drake_disasm.common.rotations import Pose, matrices_of_turns, turns_of_matrices
 from drake_disasm.common.spatial import rotation_vector
 from drake_disasm.scenario import ArmConfig
 
@@ -51,7 +51,7 @@ class Coordinates(abc.ABC):
 
 
 class BoltCoordinates(Coordinates):
-    """The twin's joints: x, y, z [m], then yaw, pitch, roll [rad] of B in Gn.
+    """The twin's joints: x, y, z [m], then turns about y, z, x [rad], of B in Gn.
 
     Args:
         p_BoTo_B: (3,), or (n, 3), point of the bolt that x, y, z are displacements
@@ -69,8 +69,7 @@ class BoltCoordinates(Coordinates):
 
     def poses(self, coordinates: Array) -> Pose:
         """Returns X_GB of coordinates (..., 6), in NumPy or torch."""
-        xp = namespace(coordinates)
-        R = matrices_of_rpy(xp.flip(coordinates[..., 3:], axis=-1))
+        R = matrices_of_turns(coordinates[..., 3:])
         p_BoTo = apply_matrix(R, self._p_BoTo_B)
         return Pose(R, coordinates[..., :3] + self._p_BoTo_B - p_BoTo)
 
@@ -82,8 +81,7 @@ class BoltCoordinates(Coordinates):
         """Returns the coordinates (..., 6) of poses."""
         xp = namespace(X_GB.p)
         p = X_GB.p + apply_matrix(X_GB.R, self._p_BoTo_B) - self._p_BoTo_B
-        yaw_pitch_roll = xp.flip(rpy_of_matrices(X_GB.R), axis=-1)
-        return xp.concat([p, yaw_pitch_roll], axis=-1)
+        return xp.concat([p, turns_of_matrices(X_GB.R)], axis=-1)
 
 
 class ArmCoordinates(Coordinates):

@@ -15,8 +15,11 @@ from drake_disasm.common.arrays import Array, cross, namespace
 from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import GripperConfig, Scenario
 
-#: Joints x, y, z, then yaw, pitch and roll, by number of axis.
-AXIS_ORDER = (0, 1, 2, 5, 4, 3)
+#: Joints along x, y, z, then about y, z, x, by number of axis. Springs stay independent
+#: of each other however far a bolt turns about the first of these.
+AXIS_ORDER = (0, 1, 2, 4, 5, 3)
+#: The place among those joints of each axis.
+JOINT_OF_AXIS = tuple(np.argsort(AXIS_ORDER).tolist())
 
 #: The simulated pads with rigid fingers behind them, as measured on the cell without
 #: adaptive fingers; along z the finger drives are in series.

@@ -71,17 +71,30 @@ def rotation_vectors(R: Array) -> Array:
     return factor[..., None] * axial
 
 
-def matrices_of_rpy(rpy: Array) -> Array:
-    """Returns R (..., 3, 3) of roll, pitch and yaw (..., 3), Rz(y) Ry(p) Rx(r)."""
-    xp = namespace(rpy)
-    sines, cosines = xp.sin(rpy), xp.cos(rpy)
-    sr, sp, sy = (sines[..., i] for i in range(3))
-    cr, cp, cy = (cosines[..., i] for i in range(3))
+def matrices_of_turns(turns: Array) -> Array:
+    """Returns R (..., 3, 3) = Ry(a) Rz(b) Rx(c) of turns a, b, c (..., 3) [rad]."""
+    xp = namespace(turns)
+    sines, cosines = xp.sin(turns), xp.cos(turns)
+    sy, sz, sx = (sines[..., i] for i in range(3))
+    cy, cz, cx = (cosines[..., i] for i in range(3))
     return matrix_of(
         [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
+            [cy * cz, sy * sx - cy * sz * cx, cy * sz * sx + sy * cx],
+            [sz, cz * cx, -cz * sx],
+            [-sy * cz, sy * sz * cx + cy * sx, cy * cx - sy * sz * sx],
+        ]
+    )
+
+
+def turns_of_matrices(R: Array) -> Array:
+    """Returns the turns (..., 3) of R, that about z within a quarter turn [rad]."""
+    xp = namespace(R)
+    level = xp.sqrt(R[..., 0, 0] ** 2 + R[..., 2, 0] ** 2)
+    return side_by_side(
+        [
+            xp.atan2(-R[..., 2, 0], R[..., 0, 0]),
+            xp.atan2(R[..., 1, 0], level),
+            xp.atan2(-R[..., 1, 2], R[..., 1, 1]),
         ]
     )
 

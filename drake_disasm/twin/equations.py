@@ -71,7 +71,7 @@ def _begins(*sizes: int) -> tuple[int, ...]:
 (_X_BEFORE, _Q_BEFORE, _VDOT, _WRENCH, _AHEAD, _MATRICES) = (
     _NEWEST + place for place in _begins(12, 6, 6, 6, 12)
 )
-#: ... w = E [yaw', pitch', roll'], rotations, the inertia about To in Gn; twist = T v;
+#: ... w = E turns', rotations, the inertia about To in Gn; twist = T v;
 #: A and b of the step without contact; the slopes of what is out of balance; M ...
 (_E, _E_BACK, _R_GNB, R_GB, _I, _T, _T_BACK, A, SLOPE, _TRIAL_SLOPE, _M, _SIX) = (
     _MATRICES + place for place in _begins(*[9] * 5, *[36] * 6)
@@ -233,21 +233,21 @@ def _set_arm(arms: np.ndarray, arm: int, w: np.ndarray) -> None:
 
 @compiled
 def _set_turning(w: np.ndarray) -> None:
-    """Sets R_GnB of yaw, pitch and roll, E of their rates, and its inverse."""
+    """Sets R_GnB of the turns about y, z and x, E of their rates, and its inverse."""
     sy, cy = math.sin(w[_Q + 3]), math.cos(w[_Q + 3])
-    sp, cp = math.sin(w[_Q + 4]), math.cos(w[_Q + 4])
-    sr, cr = math.sin(w[_Q + 5]), math.cos(w[_Q + 5])
-    xx, yx, zx = cy * cp, sy * cp, -sp
+    sz, cz = math.sin(w[_Q + 4]), math.cos(w[_Q + 4])
+    sx, cx = math.sin(w[_Q + 5]), math.cos(w[_Q + 5])
+    xx, yx, zx = cy * cz, sz, -sy * cz
     w[_R_GNB], w[_R_GNB + 3], w[_R_GNB + 6] = xx, yx, zx
-    w[_R_GNB + 1], w[_R_GNB + 2] = cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
-    w[_R_GNB + 4], w[_R_GNB + 5] = sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
-    w[_R_GNB + 7], w[_R_GNB + 8] = cp * sr, cp * cr
-    w[_E], w[_E + 1], w[_E + 2] = 0.0, -sy, xx
-    w[_E + 3], w[_E + 4], w[_E + 5] = 0.0, cy, yx
-    w[_E + 6], w[_E + 7], w[_E + 8] = 1.0, 0.0, zx
-    w[_E_BACK], w[_E_BACK + 1], w[_E_BACK + 2] = cy * sp / cp, sy * sp / cp, 1.0
-    w[_E_BACK + 3], w[_E_BACK + 4], w[_E_BACK + 5] = -sy, cy, 0.0
-    w[_E_BACK + 6], w[_E_BACK + 7], w[_E_BACK + 8] = cy / cp, sy / cp, 0.0
+    w[_R_GNB + 1], w[_R_GNB + 2] = sy * sx - cy * sz * cx, cy * sz * sx + sy * cx
+    w[_R_GNB + 4], w[_R_GNB + 5] = cz * cx, -cz * sx
+    w[_R_GNB + 7], w[_R_GNB + 8] = sy * sz * cx + cy * sx, cy * cx - sy * sz * sx
+    w[_E], w[_E + 1], w[_E + 2] = 0.0, sy, xx
+    w[_E + 3], w[_E + 4], w[_E + 5] = 1.0, 0.0, yx
+    w[_E + 6], w[_E + 7], w[_E + 8] = 0.0, cy, zx
+    w[_E_BACK], w[_E_BACK + 1], w[_E_BACK + 2] = -cy * sz / cz, 1.0, sy * sz / cz
+    w[_E_BACK + 3], w[_E_BACK + 4], w[_E_BACK + 5] = sy, 0.0, cy
+    w[_E_BACK + 6], w[_E_BACK + 7], w[_E_BACK + 8] = cy / cz, 0.0, -sy / cz
 
 
 @compiled
@@ -298,8 +298,8 @@ def _set_dynamics(w: np.ndarray) -> None:
         spun = _cross(_OMEGA, _ONE, j, w) + _times(_I, _TURNED, j, w)
         w[_OTHER + j] = weight - spun
     for j in range(3):
-        # At the angles' zero E turns the order of the axes around.
-        carried = _cross(_P_TOBCM, _WEIGHT, 2 - j, w)
+        # At the turns' zero E has the axes y, z, x.
+        carried = _cross(_P_TOBCM, _WEIGHT, (j + 1) % 3, w)
         w[_ACTING + 3 + j] = _back(_E, _OTHER, j, w) - carried
 
 
@@ -331,16 +331,16 @@ def _set_mass_matrix(w: np.ndarray) -> None:
 
 @compiled
 def _set_derivative_term(w: np.ndarray) -> None:
-    """Sets `_TURNED`, E' times the angles' rates."""
-    yaw, pitch, roll = w[_V + 3], w[_V + 4], w[_V + 5]
-    sine, cosine = -w[_E + 1], w[_E + 4]
-    w[_ONE], w[_ONE + 1], w[_ONE + 2] = -pitch * sine, pitch * cosine, yaw
+    """Sets `_TURNED`, E' times the turns' rates."""
+    about_y, about_z, about_x = w[_V + 3], w[_V + 4], w[_V + 5]
+    sine, cosine = w[_E + 1], w[_E + 7]
+    w[_ONE], w[_ONE + 1], w[_ONE + 2] = about_z * sine, about_y, about_z * cosine
     for j in range(3):
         w[_OTHER + j] = w[_E + 3 * j + 2]
     for j in range(3):
-        w[_TURNED + j] = roll * _cross(_ONE, _OTHER, j, w)
-    w[_TURNED] -= pitch * yaw * cosine
-    w[_TURNED + 1] -= pitch * yaw * sine
+        w[_TURNED + j] = about_x * _cross(_ONE, _OTHER, j, w)
+    w[_TURNED] += about_y * about_z * cosine
+    w[_TURNED + 2] -= about_y * about_z * sine
 
 
 @compiled

@@ -169,7 +169,7 @@ def _rigid(case: _Case) -> _Rigid:
 
 
 def _mass_matrix(M_B: SpatialInertia, p_BoTo_B: np.ndarray) -> np.ndarray:
-    """Returns the mass matrix (6, 6) of joints x, y, z, yaw, pitch, roll at To."""
+    """Returns the mass matrix (6, 6) of the twin's joints at To."""
     whole = M_B.Shift(p_BoTo_B).CopyToFullMatrix6()
     return whole[np.ix_(_JOINTS, _JOINTS)]
 

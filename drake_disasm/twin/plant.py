@@ -18,7 +18,7 @@ from drake_disasm.common.arrays import (
     to_numpy,
     transposed,
 )
-from drake_disasm.common.rotations import cross_matrices, matrices_of_rpy
+from drake_disasm.common.rotations import cross_matrices, matrices_of_turns
 from drake_disasm.twin.arm_step import ArmStep
 from drake_disasm.twin.conditions import ImpactConditions, joined_columns
 from drake_disasm.twin.equations import advance_rows
@@ -220,11 +220,11 @@ def _advance_on_host(
     return state, newest, is_solved
 
 
-def turning(angles: Array) -> tuple[Array, Array]:
-    """Returns E (n, 3, 3), w = E [yaw', pitch', roll'], and R_GnB of angles (n, 3)."""
-    xp = namespace(angles)
-    R_GnB = matrices_of_rpy(xp.flip(angles, axis=-1))
-    s, c = xp.sin(angles[:, 0]), xp.cos(angles[:, 0])
+def turning(turns: Array) -> tuple[Array, Array]:
+    """Returns E (n, 3, 3), w = E turns', and R_GnB of turns about y, z, x (n, 3)."""
+    xp = namespace(turns)
+    R_GnB = matrices_of_turns(turns)
+    s, c = xp.sin(turns[:, 0]), xp.cos(turns[:, 0])
     zero, one = xp.zeros_like(s), xp.ones_like(s)
     x, y, z = R_GnB[:, 0, 0], R_GnB[:, 1, 0], R_GnB[:, 2, 0]
-    return matrix_of([[zero, -s, x], [zero, c, y], [one, zero, z]]), R_GnB
+    return matrix_of([[zero, s, x], [one, zero, y], [zero, c, z]]), R_GnB

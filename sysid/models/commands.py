@@ -7,6 +7,8 @@ from typing import Self
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.common.rotations import Pose, rotation_matrices, rotation_vectors
 from drake_disasm.effects import MotionEffect
 from drake_disasm.logs import Episode
 from drake_disasm.systems.pose_target import through_motion
@@ -52,9 +54,8 @@ def bolt_path(coordinates: Array, p_BoTo_B: Array) -> Array:
         coordinates: (n, 6) of the twin.
         p_BoTo_B: (3,) see `BoltCoordinates`.
     """
-    turn = Rotation.from_euler("ZYX", coordinates[:, 3:])
-    p = np.array(p_BoTo_B)
-    return np.hstack([coordinates[:, :3] - turn.apply(p) + p, turn.as_rotvec()])
+    X_GB = BoltCoordinates(p_BoTo_B).poses(coordinates)
+    return np.hstack([X_GB.p, rotation_vectors(X_GB.R)])
 
 
 def twin_coordinates(path: Array, p_BoTo_B: Array) -> Array:
@@ -64,7 +65,5 @@ def twin_coordinates(path: Array, p_BoTo_B: Array) -> Array:
         path: of B in G.
         p_BoTo_B: (3,) see `BoltCoordinates`.
     """
-    turn = Rotation.from_rotvec(path[:, 3:])
-    p = np.array(p_BoTo_B)  # scipy takes no read-only array
-    moved = path[:, :3] + turn.apply(p) - p
-    return np.hstack([moved, turn.as_euler("ZYX")])
+    X_GB = Pose(rotation_matrices(path[:, 3:]), path[:, :3])
+    return np.asarray(BoltCoordinates(p_BoTo_B).of_poses(X_GB))

@@ -9,10 +9,11 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import UniformGravityFieldElement
 from scipy.spatial.transform import Rotation
 
-from drake_disasm.cell.grip import AXIS_ORDER, Springs
+from drake_disasm.cell.grip import AXIS_ORDER, JOINT_OF_AXIS, Springs
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import Tool
 from drake_disasm.cell.twin_parameters import twin_of
+from drake_disasm.common.rotations import matrices_of_turns
 from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import Scenario
 from sysid.models.base import Array
@@ -160,7 +161,7 @@ class GripState:
         Args:
             give: (n, 6) in the twin's coordinates.
         """
-        given = give[:, list(AXIS_ORDER)]
+        given = give[:, list(JOINT_OF_AXIS)]
         at_grip = given * self.springs.stiffness
         at_grip[:, 3:] += np.cross(given[:, :3], at_grip[:, :3] + self.rest[:3])
         return self.from_pads(at_grip)
@@ -233,7 +234,7 @@ def of_encoders(states: Array, q: Array, elsewhere: Array, p_BoTo_B: Array) -> A
 
 def _turns(coordinates: Array) -> Rotation:
     """Returns the rotations of coordinates (n, 6)."""
-    return Rotation.from_euler("ZYX", coordinates[:, 3:])
+    return Rotation.from_matrix(matrices_of_turns(coordinates[:, 3:]))
 
 
 def _turned(turns: Rotation, vectors: Array) -> Array:

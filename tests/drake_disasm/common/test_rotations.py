@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 from pydrake.math import RigidTransform, RollPitchYaw
+from scipy.spatial.transform import Rotation
 
 from drake_disasm.common import rotations
 from drake_disasm.common.arrays import array_like, to_numpy
@@ -47,10 +48,18 @@ def test_one_pose_of_numpy_is_drakes_own() -> None:
 @both
 def test_roll_pitch_and_yaw_are_drakes(like):
     rpy = RANDOM.uniform(-1.5, 1.5, (10, 3))
-    R = rotations.matrices_of_rpy(array_like(rpy, like))
-    expected = [RollPitchYaw(one).ToRotationMatrix().matrix() for one in rpy]
-    np.testing.assert_allclose(to_numpy(R), expected, atol=1e-14)
+    R = array_like([RollPitchYaw(one).ToRotationMatrix().matrix() for one in rpy], like)
     np.testing.assert_allclose(to_numpy(rotations.rpy_of_matrices(R)), rpy, atol=1e-12)
+
+
+@both
+def test_turns_are_about_y_then_z_then_x(like):
+    turns = RANDOM.uniform(-1.5, 1.5, (10, 3))
+    R = rotations.matrices_of_turns(array_like(turns, like))
+    expected = Rotation.from_euler("YZX", turns).as_matrix()
+    np.testing.assert_allclose(to_numpy(R), expected, atol=1e-14)
+    found = to_numpy(rotations.turns_of_matrices(R))
+    np.testing.assert_allclose(found, turns, atol=1e-12)
 
 
 @both

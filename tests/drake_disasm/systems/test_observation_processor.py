@@ -69,7 +69,8 @@ def test_reads_nothing_where_it_was_zeroed_and_roll_pitch_yaw() -> None:
     for variant in ("exact", "small_angle"):
         observation, _ = _observe(variant, UPRIGHT, np.zeros(6), reading, reading)
         np.testing.assert_allclose(observation, 0.0, atol=1e-13)
-    q = np.array([0, 0, 0, 0.3, -0.2, 0.1])  # yaw, pitch, roll
+    R = RollPitchYaw(0.1, -0.2, 0.3).ToRotationMatrix()
+    q = BoltCoordinates().solve(RigidTransform(R), np.zeros(6))
     observation, _ = _observe("small_angle", UPRIGHT, q, np.zeros(6), np.zeros(6))
     np.testing.assert_allclose(observation[3:6], [0.1, -0.2, 0.3], atol=1e-14)
 
