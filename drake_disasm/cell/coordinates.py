@@ -51,7 +51,7 @@ class Coordinates(abc.ABC):
 
 
 class BoltCoordinates(Coordinates):
-    """The twin's joints: x, y, z [m], then turns about y, z, x [rad], of B in Gn.
+    """The twin's joints: x, y, z [m], then turns about z, x, y [rad], of B in Gn.
 
     Args:
         p_BoTo_B: (3,), or (n, 3), point of the bolt that x, y, z are displacements

@@ -15,9 +15,9 @@ from drake_disasm.common.arrays import Array, cross, namespace
 from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import GripperConfig, Scenario
 
-#: Joints along x, y, z, then about y, z, x, by number of axis. Springs stay independent
-#: of each other however far a bolt turns about the first of these.
-AXIS_ORDER = (0, 1, 2, 4, 5, 3)
+#: Joints along x, y, z, then about z, x, y, by number of axis. Springs stay independent
+#: of each other, and an arm's along its own axes, however far a bolt turns about y.
+AXIS_ORDER = (0, 1, 2, 5, 3, 4)
 #: The place among those joints of each axis.
 JOINT_OF_AXIS = tuple(np.argsort(AXIS_ORDER).tolist())
 

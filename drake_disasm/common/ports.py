@@ -84,12 +84,12 @@ TWIN_PORTS: tuple[Port, ...] = (
         "bolt.position",
         6,
         "m, rad",
-        "B in Gn: x, y, z, turns about y, z, x",
+        "B in Gn: x, y, z, turns about z, x, y",
         is_input=True,
     ),
     Port("bolt.velocity", 6, "m/s, rad/s", "rate of bolt.position", is_input=True),
     Port(
-        "bolt.position_measured", 6, "m, rad", "B in Gn: x, y, z, turns about y, z, x"
+        "bolt.position_measured", 6, "m, rad", "B in Gn: x, y, z, turns about z, x, y"
     ),
     Port("ft_sensor.wrench", 6, "N, N m", _WRENCH_FRAME),
     *_device("bolt"),

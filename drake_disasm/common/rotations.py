@@ -72,29 +72,29 @@ def rotation_vectors(R: Array) -> Array:
 
 
 def matrices_of_turns(turns: Array) -> Array:
-    """Returns R (..., 3, 3) = Ry(a) Rz(b) Rx(c) of turns a, b, c (..., 3) [rad]."""
+    """Returns R (..., 3, 3) = Rz(a) Rx(b) Ry(c) of turns a, b, c (..., 3) [rad]."""
     xp = namespace(turns)
     sines, cosines = xp.sin(turns), xp.cos(turns)
-    sy, sz, sx = (sines[..., i] for i in range(3))
-    cy, cz, cx = (cosines[..., i] for i in range(3))
+    sz, sx, sy = (sines[..., i] for i in range(3))
+    cz, cx, cy = (cosines[..., i] for i in range(3))
     return matrix_of(
         [
-            [cy * cz, sy * sx - cy * sz * cx, cy * sz * sx + sy * cx],
-            [sz, cz * cx, -cz * sx],
-            [-sy * cz, sy * sz * cx + cy * sx, cy * cx - sy * sz * sx],
+            [cz * cy - sz * sx * sy, -sz * cx, cz * sy + sz * sx * cy],
+            [sz * cy + cz * sx * sy, cz * cx, sz * sy - cz * sx * cy],
+            [-cx * sy, sx, cx * cy],
         ]
     )
 
 
 def turns_of_matrices(R: Array) -> Array:
-    """Returns the turns (..., 3) of R, that about z within a quarter turn [rad]."""
+    """Returns the turns (..., 3) of R, that about x within a quarter turn [rad]."""
     xp = namespace(R)
-    level = xp.sqrt(R[..., 0, 0] ** 2 + R[..., 2, 0] ** 2)
+    level = xp.sqrt(R[..., 0, 1] ** 2 + R[..., 1, 1] ** 2)
     return side_by_side(
         [
-            xp.atan2(-R[..., 2, 0], R[..., 0, 0]),
-            xp.atan2(R[..., 1, 0], level),
-            xp.atan2(-R[..., 1, 2], R[..., 1, 1]),
+            xp.atan2(-R[..., 0, 1], R[..., 1, 1]),
+            xp.atan2(R[..., 2, 1], level),
+            xp.atan2(-R[..., 2, 0], R[..., 2, 2]),
         ]
     )
 

@@ -19,7 +19,7 @@ _AXES = np.eye(3)
 
 
 class SixAxisSpring:
-    """Joints along x, y, z and about y, z, x from a frame, with a spring in each.
+    """Joints along x, y, z and about z, x, y from a frame, with a spring in each.
 
     Stiffness and damping are the gains of Drake's PD controllers, which the discrete
     solver takes implicitly.

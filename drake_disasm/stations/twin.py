@@ -51,8 +51,8 @@ class TwinStation(SimulatedStation):
 
     Its numbers are `twin_of(scenario)`. The arm under its controller is a linear
     system (`ArmNode`); where it is, is `bolt.position_measured`, as encoders see it.
-    Behind it is the gripper's six-axis spring, of joints along x, y, z and about y, z,
-    x from Gn in the middle of the pads, which the solver takes implicitly: what it
+    Behind it is the gripper's six-axis spring, of joints along x, y, z and about z, x,
+    y from Gn in the middle of the pads, which the solver takes implicitly: what it
     gives by, no encoder sees. Bolt and fingers hang on it by a weld at S whose
     reaction is the sensor's load, so the readings mean the same as the cell's and
     pass the same processing. While `bolt.velocity` is not connected it is zero.

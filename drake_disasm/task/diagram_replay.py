@@ -51,7 +51,7 @@ class TwinReplay:
     at its end. `reconfigure` changes the parameters in place, so
     that one diagram serves a whole identification.
 
-    The coordinates are the twin's: x, y, z [m], turns about y, z, x [rad] of B in Gn
+    The coordinates are the twin's: x, y, z [m], turns about z, x, y [rad] of B in Gn
     (`BoltCoordinates`).
 
     Args:

@@ -233,21 +233,21 @@ def _set_arm(arms: np.ndarray, arm: int, w: np.ndarray) -> None:
 
 @compiled
 def _set_turning(w: np.ndarray) -> None:
-    """Sets R_GnB of the turns about y, z and x, E of their rates, and its inverse."""
-    sy, cy = math.sin(w[_Q + 3]), math.cos(w[_Q + 3])
-    sz, cz = math.sin(w[_Q + 4]), math.cos(w[_Q + 4])
-    sx, cx = math.sin(w[_Q + 5]), math.cos(w[_Q + 5])
-    xx, yx, zx = cy * cz, sz, -sy * cz
-    w[_R_GNB], w[_R_GNB + 3], w[_R_GNB + 6] = xx, yx, zx
-    w[_R_GNB + 1], w[_R_GNB + 2] = sy * sx - cy * sz * cx, cy * sz * sx + sy * cx
-    w[_R_GNB + 4], w[_R_GNB + 5] = cz * cx, -cz * sx
-    w[_R_GNB + 7], w[_R_GNB + 8] = sy * sz * cx + cy * sx, cy * cx - sy * sz * sx
-    w[_E], w[_E + 1], w[_E + 2] = 0.0, sy, xx
-    w[_E + 3], w[_E + 4], w[_E + 5] = 1.0, 0.0, yx
-    w[_E + 6], w[_E + 7], w[_E + 8] = 0.0, cy, zx
-    w[_E_BACK], w[_E_BACK + 1], w[_E_BACK + 2] = -cy * sz / cz, 1.0, sy * sz / cz
-    w[_E_BACK + 3], w[_E_BACK + 4], w[_E_BACK + 5] = sy, 0.0, cy
-    w[_E_BACK + 6], w[_E_BACK + 7], w[_E_BACK + 8] = cy / cz, 0.0, -sy / cz
+    """Sets R_GnB of the turns about z, x and y, E of their rates, and its inverse."""
+    sz, cz = math.sin(w[_Q + 3]), math.cos(w[_Q + 3])
+    sx, cx = math.sin(w[_Q + 4]), math.cos(w[_Q + 4])
+    sy, cy = math.sin(w[_Q + 5]), math.cos(w[_Q + 5])
+    xy, yy, zy = -sz * cx, cz * cx, sx
+    w[_R_GNB], w[_R_GNB + 2] = cz * cy - sz * sx * sy, cz * sy + sz * sx * cy
+    w[_R_GNB + 3], w[_R_GNB + 5] = sz * cy + cz * sx * sy, sz * sy - cz * sx * cy
+    w[_R_GNB + 6], w[_R_GNB + 8] = -cx * sy, cx * cy
+    w[_R_GNB + 1], w[_R_GNB + 4], w[_R_GNB + 7] = xy, yy, zy
+    w[_E], w[_E + 1], w[_E + 2] = 0.0, cz, xy
+    w[_E + 3], w[_E + 4], w[_E + 5] = 0.0, sz, yy
+    w[_E + 6], w[_E + 7], w[_E + 8] = 1.0, 0.0, zy
+    w[_E_BACK], w[_E_BACK + 1], w[_E_BACK + 2] = sx * sz / cx, -sx * cz / cx, 1.0
+    w[_E_BACK + 3], w[_E_BACK + 4], w[_E_BACK + 5] = cz, sz, 0.0
+    w[_E_BACK + 6], w[_E_BACK + 7], w[_E_BACK + 8] = -sz / cx, cz / cx, 0.0
 
 
 @compiled
@@ -298,8 +298,8 @@ def _set_dynamics(w: np.ndarray) -> None:
         spun = _cross(_OMEGA, _ONE, j, w) + _times(_I, _TURNED, j, w)
         w[_OTHER + j] = weight - spun
     for j in range(3):
-        # At the turns' zero E has the axes y, z, x.
-        carried = _cross(_P_TOBCM, _WEIGHT, (j + 1) % 3, w)
+        # At the turns' zero E has the axes z, x, y.
+        carried = _cross(_P_TOBCM, _WEIGHT, (j + 2) % 3, w)
         w[_ACTING + 3 + j] = _back(_E, _OTHER, j, w) - carried
 
 
@@ -332,15 +332,15 @@ def _set_mass_matrix(w: np.ndarray) -> None:
 @compiled
 def _set_derivative_term(w: np.ndarray) -> None:
     """Sets `_TURNED`, E' times the turns' rates."""
-    about_y, about_z, about_x = w[_V + 3], w[_V + 4], w[_V + 5]
-    sine, cosine = w[_E + 1], w[_E + 7]
-    w[_ONE], w[_ONE + 1], w[_ONE + 2] = about_z * sine, about_y, about_z * cosine
+    about_z, about_x, about_y = w[_V + 3], w[_V + 4], w[_V + 5]
+    cosine, sine = w[_E + 1], w[_E + 4]
+    w[_ONE], w[_ONE + 1], w[_ONE + 2] = about_x * cosine, about_x * sine, about_z
     for j in range(3):
         w[_OTHER + j] = w[_E + 3 * j + 2]
     for j in range(3):
-        w[_TURNED + j] = about_x * _cross(_ONE, _OTHER, j, w)
-    w[_TURNED] += about_y * about_z * cosine
-    w[_TURNED + 2] -= about_y * about_z * sine
+        w[_TURNED + j] = about_y * _cross(_ONE, _OTHER, j, w)
+    w[_TURNED] -= about_z * about_x * sine
+    w[_TURNED + 1] += about_z * about_x * cosine
 
 
 @compiled

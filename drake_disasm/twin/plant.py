@@ -221,10 +221,10 @@ def _advance_on_host(
 
 
 def turning(turns: Array) -> tuple[Array, Array]:
-    """Returns E (n, 3, 3), w = E turns', and R_GnB of turns about y, z, x (n, 3)."""
+    """Returns E (n, 3, 3), w = E turns', and R_GnB of turns about z, x, y (n, 3)."""
     xp = namespace(turns)
     R_GnB = matrices_of_turns(turns)
     s, c = xp.sin(turns[:, 0]), xp.cos(turns[:, 0])
     zero, one = xp.zeros_like(s), xp.ones_like(s)
-    x, y, z = R_GnB[:, 0, 0], R_GnB[:, 1, 0], R_GnB[:, 2, 0]
-    return matrix_of([[zero, s, x], [one, zero, y], [zero, c, z]]), R_GnB
+    x, y, z = R_GnB[:, 0, 1], R_GnB[:, 1, 1], R_GnB[:, 2, 1]
+    return matrix_of([[zero, c, x], [zero, s, y], [one, zero, z]]), R_GnB

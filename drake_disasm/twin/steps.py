@@ -80,7 +80,7 @@ def bolt_motion(
     """
     X_GB = coordinates.poses(q_bolt)
     p_BoTo = apply_matrix(X_GB.R, p_BoTo_B)
-    rate_of_turn = qd_rate[..., [5, 3, 4]]  # about x, y, z while small
+    rate_of_turn = qd_rate[..., [4, 5, 3]]  # about x, y, z while small
     v = qd_rate[..., :3] - cross(rate_of_turn, p_BoTo)
     return BoltMotion(X_GB.p, v, time)
 

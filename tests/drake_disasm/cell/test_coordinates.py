@@ -35,14 +35,14 @@ def test_solve_inverts_pose_from_the_start_on(name: str, seed: int, request) -> 
         assert distance < 1e-6 and angle < 1e-5
 
 
-def test_twin_coordinates_are_xyz_and_turns_about_y_z_x(twin: TwinStation) -> None:
+def test_twin_coordinates_are_xyz_and_turns_about_z_x_y(twin: TwinStation) -> None:
     """Of the middle of the pads, from where it is at A."""
     p_BoTo_B = twin.parameters.p_BoTo_B
     assert np.linalg.norm(p_BoTo_B) > 0.01
     X_GB = twin.coordinates.pose(np.array([1, 2, 3, 0.3, 0.2, 0.1]))
-    turns = zip((0.3, 0.2, 0.1), np.eye(3)[[1, 2, 0]], strict=True)
-    y, z, x = (RotationMatrix(AngleAxis(angle, axis)) for angle, axis in turns)
-    turn = y @ z @ x
+    turns = zip((0.3, 0.2, 0.1), np.eye(3)[[2, 0, 1]], strict=True)
+    z, x, y = (RotationMatrix(AngleAxis(angle, axis)) for angle, axis in turns)
+    turn = z @ x @ y
     np.testing.assert_allclose(X_GB.rotation().matrix(), turn.matrix(), atol=1e-15)
     np.testing.assert_allclose(X_GB @ p_BoTo_B, np.add(p_BoTo_B, [1, 2, 3]), rtol=1e-14)
 

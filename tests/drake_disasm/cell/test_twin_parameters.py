@@ -11,7 +11,7 @@ from drake_disasm.stations import TwinStation
 from drake_disasm.twin.arm_step import ArmStep
 
 _P = np.array([0.0, 0.02, 0.01])
-_ORDER = [0, 1, 2, 4, 5, 3]  # along x, y, z, about y, z, x
+_ORDER = [0, 1, 2, 5, 3, 4]  # along x, y, z, about z, x, y
 
 
 def _positive(random: np.random.Generator, scale: np.ndarray) -> np.ndarray:

@@ -53,10 +53,10 @@ def test_roll_pitch_and_yaw_are_drakes(like):
 
 
 @both
-def test_turns_are_about_y_then_z_then_x(like):
+def test_turns_are_about_z_then_x_then_y(like):
     turns = RANDOM.uniform(-1.5, 1.5, (10, 3))
     R = rotations.matrices_of_turns(array_like(turns, like))
-    expected = Rotation.from_euler("YZX", turns).as_matrix()
+    expected = Rotation.from_euler("ZXY", turns).as_matrix()
     np.testing.assert_allclose(to_numpy(R), expected, atol=1e-14)
     found = to_numpy(rotations.turns_of_matrices(R))
     np.testing.assert_allclose(found, turns, atol=1e-12)

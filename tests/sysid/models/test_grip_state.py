@@ -62,20 +62,20 @@ def test_a_torque_about_z_turns_the_bolt_about_the_middle_of_its_patch():
     wrench = np.tile(_at_Bo([0.0, 0.0, 0.0, 0.0, 0.0, torque]), (steps + 1, 1))
     crept = _grip().elsewhere(np.zeros_like(wrench), wrench)
     turn = _RATE * torque * 0.1 * np.arange(steps + 1)
-    np.testing.assert_allclose(crept[:, 4], turn, rtol=1e-9)  # about y, z, x
+    np.testing.assert_allclose(crept[:, 3], turn, rtol=1e-9)  # about z, x, y
     lever = _grip().p_BoTo_B[1] - _PATCH[1]
     np.testing.assert_allclose(crept[:, 0], -lever * turn, rtol=1e-9)
-    assert np.abs(crept[:, [2, 3, 5]]).max() < 1e-12
+    assert np.abs(crept[:, [2, 4, 5]]).max() < 1e-12
 
 
 def test_the_axes_along_which_it_creeps_turn_with_the_arm():
     """Rolled by a right angle: what was about z is about y."""
     torque, grip = 0.1, dataclasses.replace(_grip(), rest=np.zeros(6))
-    roll = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, np.pi / 2.0], (11, 1))
+    roll = np.tile([0.0, 0.0, 0.0, 0.0, np.pi / 2.0, 0.0], (11, 1))
     wrench = np.tile([0.0, 0.0, 0.0, 0.0, -torque, 0.0], (11, 1))
     crept = grip.elsewhere(roll, wrench)
-    assert crept[-1, 3] == pytest.approx(-_RATE * torque, rel=1e-9)  # about y
-    assert np.abs(crept[:, [4, 5]]).max() < 1e-12
+    assert crept[-1, 5] == pytest.approx(-_RATE * torque, rel=1e-9)  # about y
+    assert np.abs(crept[:, [3, 4]]).max() < 1e-12
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_the_springs_give_by_the_weight_that_turned_away():
     """Rolled by a right angle, they carry it across instead of along y."""
     grip = _grip(scenario=load_scenario("removal", ["gripper.hold=weld"]))
     roll = np.zeros((2, 6))
-    roll[1, 5] = np.pi / 2.0
+    roll[1, 4] = np.pi / 2.0
     found = grip.elsewhere(roll, np.zeros((2, 6)))
     np.testing.assert_allclose(found[0], 0.0, atol=1e-15)
     f = grip.rest[:3]
