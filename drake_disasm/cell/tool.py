@@ -17,10 +17,10 @@ from pydrake.multibody.tree import (
     PrismaticJoint,
     RigidBody,
     SpatialInertia,
-    WeldJoint,
 )
 
 from drake_disasm.cell.parsing import add_model, model_frame
+from drake_disasm.cell.sensor import SensorModel, add_sensor
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.scenario import GripperConfig, Scenario
@@ -29,6 +29,8 @@ from drake_disasm.scenario import GripperConfig, Scenario
 @dataclasses.dataclass(frozen=True)
 class Tool:
     """Rigid geometry and mass of everything beyond the sensor's joint.
+
+    Without a sensor in the wrist that is all on the flange, and S is F.
 
     Attributes:
         X_FB, X_SB: pose of the bolt, as grasped, in flange and sensor frame.
@@ -102,53 +104,51 @@ class ToolModels:
     """Handles of sensor and gripper in a plant.
 
     Attributes:
-        sensor_joint: the weld between flange and sensor whose reaction is read.
-        frame_S, frame_T: sensing frame and tool centre point.
+        frame_S, frame_T: sensing frame (the flange without a sensor in the wrist), and
+            tool centre point.
         frame_tip: where the pads end along z_T.
         carriage: body that carries the fingers, fixed to the palm.
         fingers: the joints of the two fingers.
-        sensor, gripper: model instances.
+        sensor: in the wrist, or None.
+        gripper: model instance.
     """
 
-    sensor_joint: WeldJoint
     frame_S: Frame
     frame_T: Frame
     frame_tip: Frame
     carriage: RigidBody
     fingers: tuple[PrismaticJoint, PrismaticJoint]
-    sensor: ModelInstanceIndex
+    sensor: SensorModel | None
     gripper: ModelInstanceIndex
 
     @property
-    def instances(self) -> tuple[ModelInstanceIndex, ModelInstanceIndex]:
-        """Both model instances."""
-        return self.sensor, self.gripper
+    def instances(self) -> tuple[ModelInstanceIndex, ...]:
+        """The model instances."""
+        return (*([self.sensor.instance] if self.sensor else []), self.gripper)
 
 
 def add_tool(plant: MultibodyPlant, frame_F: Frame, scenario: Scenario) -> ToolModels:
-    """Adds the sensor to the flange and the gripper to the sensor.
+    """Adds the sensor to the flange, if it is in the wrist, and the gripper to it.
 
-    The sensor's link, its origin on the robot-side face, sits on F. The weld's child
-    frame is S, so the joint's reaction is what is sensed there.
+    Without one S is the gripper's base, on the flange.
 
     Raises:
         DisasmError: a model file is missing or is of another device.
     """
-    url = scenario.ft_sensor.model
-    sensor = add_model(plant, url)
-    frame_S = model_frame(plant, sensor, "sensor", url)
-    joint = plant.WeldFrames(frame_F, frame_S, frame_S.GetFixedPoseInBodyFrame())
-    tool_side = model_frame(plant, sensor, "tool_side", url)
+    on, sensor = frame_F, None
+    if scenario.ft_sensor.place == "wrist":
+        sensor = add_sensor(plant, frame_F, scenario.ft_sensor.model)
+        on = sensor.tool_side
     url = scenario.gripper.model
     gripper = add_model(plant, url)
-    plant.WeldFrames(tool_side, model_frame(plant, gripper, "gripper_base", url))
+    base = model_frame(plant, gripper, "gripper_base", url)
+    plant.WeldFrames(on, base)
+    frame_S = sensor.frame_S if sensor else base
     frame_T = model_frame(plant, gripper, "tcp", url)
     frame_tip = model_frame(plant, gripper, "fingertip", url)
     carriage = model_frame(plant, gripper, "finger_carriage", url).body()
     fingers = _fingers(plant, gripper, scenario.gripper)
-    return ToolModels(
-        joint, frame_S, frame_T, frame_tip, carriage, fingers, sensor, gripper
-    )
+    return ToolModels(frame_S, frame_T, frame_tip, carriage, fingers, sensor, gripper)
 
 
 def _fingers(

@@ -159,6 +159,11 @@ class GripperConfig:
 class SensorConfig:
     """OnRobot HEX-E: noise and resolution per channel [f; tau] in S."""
 
+    place: str = quantity(
+        "wrist", "", "where the wrench is measured: between flange and gripper; under "
+        "the fixed part; or none: estimated from the joints' torques, S on the flange",
+        choices=("wrist", "part", "none"),
+    )  # fmt: skip
     model: str = quantity("package://disasm_models/hex_e/hex_e.urdf", "", "URDF")
     period: float = quantity(0.01, "s", "between samples", low=0.002, high=1.0)
     noise: list[float] = quantity(

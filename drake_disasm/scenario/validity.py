@@ -47,6 +47,7 @@ def _validate_one(scenario: Scenario) -> None:
     _refuse_impossible_stiffness(scenario.arm.cartesian_impedance)
     scenario.part.refuse_impossible()
     _refuse_unreachable_end(scenario)
+    _refuse_small_angles(scenario)
 
 
 def _refuse_unregistered(scenario: Scenario) -> None:
@@ -114,4 +115,13 @@ def _refuse_unreachable_end(scenario: Scenario) -> None:
         raise DisasmError(
             f"task.travel_success: the way along {AXES[stage.axis]} ends after "
             f"{end:g} m, {task.travel_success:g} m is never reached; give less"
+        )
+
+
+def _refuse_small_angles(scenario: Scenario) -> None:
+    """The thesis's equations are those of a sensor that moves with the bolt."""
+    if scenario.ft_sensor.place == "part" and scenario.observation.variant != "exact":
+        raise DisasmError(
+            "observation.variant: 'small_angle' is for a sensor that moves with the "
+            "bolt; set it to exact, or ft_sensor.place to wrist"
         )

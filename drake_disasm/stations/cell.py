@@ -22,7 +22,9 @@ from pydrake.systems.primitives import (
 
 from drake_disasm.cell.arm_control import joint_gains
 from drake_disasm.cell.arm_dynamics import ArmDynamics
+from drake_disasm.cell.arm_wrench import ArmWrench
 from drake_disasm.cell.grip import AXIS_ORDER, finger_springs
+from drake_disasm.devices.load_source import JointReaction, JointTorques
 from drake_disasm.effects import ArmEffect
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.arm_mechanics import ArmMechanics, refuse_unknown_arm_effects
@@ -32,7 +34,11 @@ from drake_disasm.stations.contact import exclude_collisions
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.stations.start_collisions import refuse_collisions
-from drake_disasm.stations.wiring import export_ready_device, export_required
+from drake_disasm.stations.wiring import (
+    export_ready_device,
+    export_required,
+    reaction_ports,
+)
 from drake_disasm.systems.cartesian_impedance import CartesianImpedance
 
 _PAD_INDENTATION = 3e-5  # m, of a pad (20 MPa, 7.5 mm thick) under some 60 N
@@ -116,13 +122,17 @@ class CellStation(SimulatedStation):
             fingers = add_adaptive_fingers(plant, self.tool_models, springs)
         plant.Finalize()
         self._set_gains()
-        self._wire_arm(builder)
+        measured = self._wire_arm(builder)
         self._wire_gripper(builder)
         if fingers:
             self._wire_adaptive_fingers(builder, fingers)
-        self._add_sensor(
-            builder, self.tool_models.sensor_joint, self.tool_models.frame_S
-        )
+        if models.sensor:
+            source = JointReaction(models.sensor.joint, models.sensor.frame_S)
+            self._add_sensor(builder, source, reaction_ports(plant))
+        else:
+            arm, n = ArmWrench(config.arm), len(self.joints)
+            torques = JointTorques(arm, n, self.time_step)
+            self._add_sensor(builder, torques, measured)
         self._finish(builder)
 
     def _set_gains(self) -> None:
@@ -137,7 +147,8 @@ class CellStation(SimulatedStation):
             k = gripper.finger_stiffness
             _set_spring(plant, index, k, 2.0 * np.sqrt(k * _FINGER_MASS))
 
-    def _wire_arm(self, builder: DiagramBuilder) -> None:
+    def _wire_arm(self, builder: DiagramBuilder) -> dict[str, OutputPort]:
+        """Adds the arm's controller; returns what is measured of the joints."""
         plant, connect, n = self.plant, builder.Connect, len(self.joints)
         command = builder.AddNamedSystem("arm_command", PassThrough(n))
         export_required(
@@ -171,6 +182,7 @@ class CellStation(SimulatedStation):
         for quantity, port in outputs.items():
             builder.ExportOutput(port, f"{self.arm}.{quantity}")
         export_ready_device(builder, self.arm, self.time_step)
+        return {"position": position, "velocity": velocity, "torque": measured}
 
     @staticmethod
     def _in_halves(

@@ -13,6 +13,11 @@ from drake_disasm.cell.grip import Springs
 from drake_disasm.cell.lock import Lock, add_lock
 from drake_disasm.cell.parsing import add_model
 from drake_disasm.cell.placement import bench_top
+from drake_disasm.cell.sensor import (
+    SensorModel,
+    add_sensor_under_part,
+    fixed_inertia,
+)
 from drake_disasm.cell.tool import ToolModels, add_tool, grasp_pose, grasp_rotation
 from drake_disasm.effects import Environment
 from drake_disasm.scenario import Scenario
@@ -29,12 +34,14 @@ class CellModels:
         arm: on its base.
         tool: sensor and gripper.
         lock: groove and bolt.
-        bench: collision geometries of its top.
+        sensor: whose joint's reaction is read; None if there is none.
+        bench: collision geometries of what lies under the part.
     """
 
     arm: ArmModel
     tool: ToolModels
     lock: Lock
+    sensor: SensorModel | None
     bench: list[GeometryId]
 
 
@@ -82,12 +89,30 @@ def add_cell(
     """
     arm = add_arm(plant, scenario.arm)
     tool = add_tool(plant, arm.frame_F, scenario)
-    lock = add_lock(plant, frame_Gn, scenario.part, scenario.contact, environment)
+    under, lock = add_weighed_lock(plant, frame_Gn, scenario, environment)
     bench = _add_bench(plant, frame_Gn, scenario)
+    if under:
+        body = under.frame_S.body()
+        bench += plant.GetCollisionGeometriesForBody(body)
     if scenario.gripper.hold == "weld":
         bolt = lock.bolt.body_frame()
         plant.WeldFrames(tool.frame_T, bolt, grasp_pose(scenario, tool))
-    return CellModels(arm, tool, lock, bench)
+    return CellModels(arm, tool, lock, under or tool.sensor, bench)
+
+
+def add_weighed_lock(
+    plant: MultibodyPlant,
+    frame_Gn: Frame,
+    scenario: Scenario,
+    environment: Environment | None,
+) -> tuple[SensorModel | None, Lock]:
+    """Adds the part, on a sensor if the scenario has it there; see `add_lock`."""
+    part, contact = scenario.part, scenario.contact
+    if scenario.ft_sensor.place != "part":
+        return None, add_lock(plant, frame_Gn, part, contact, environment)
+    sensor, carried = add_sensor_under_part(plant, frame_Gn, scenario)
+    M_G = fixed_inertia(scenario)
+    return sensor, add_lock(plant, carried, part, contact, environment, M_G)
 
 
 def _add_bench(
