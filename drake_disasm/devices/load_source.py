@@ -115,7 +115,7 @@ class JointTorques(LoadSource):
             for name in ("position", "velocity", "torque")
         ]
         self._before = sensor.DeclareDiscreteState(n)  # velocities
-        # Unrestricted, as the plant's own update is: a discrete one would come after it.
+        # Unrestricted, as the plant's own update: a discrete one would come after it.
         sensor.DeclarePeriodicUnrestrictedUpdateEvent(self._h, 0.0, self._remember)
         return {port.ticket() for port in self._ports} | {sensor.xd_ticket()}
 
