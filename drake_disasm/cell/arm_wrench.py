@@ -54,6 +54,11 @@ class ArmWrench:
         self._plant.SetPositions(self._context, q)
         return self._wrench(torque)
 
+    def torque(self, q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+        """Returns the torques (n,) in the joints of a wrench on the flange (6,)."""
+        self._plant.SetPositions(self._context, q)
+        return np.asarray(self._jacobian().T @ np.roll(wrench, 3))
+
     def R_WF(self, q: np.ndarray) -> np.ndarray:
         """Returns the flange's orientation in the world (3, 3)."""
         self._plant.SetPositions(self._context, q)
@@ -62,6 +67,11 @@ class ArmWrench:
 
     def _wrench(self, torque: np.ndarray) -> np.ndarray:
         """Returns pinv(J^T) torque: what comes nearest to the torques (n,)."""
+        F = np.linalg.lstsq(self._jacobian().T, torque, rcond=None)[0]
+        return np.roll(F, 3)
+
+    def _jacobian(self) -> np.ndarray:
+        """Returns the Jacobian (6, n) at Fo in F, [rotation; translation]."""
         J = self._plant.CalcJacobianSpatialVelocity(
             self._context,
             JacobianWrtVariable.kV,
@@ -70,5 +80,4 @@ class ArmWrench:
             self._plant.world_frame(),
             self._frame_F,
         )
-        F = np.linalg.lstsq(J.T, torque, rcond=None)[0]
-        return np.concatenate([F[3:], F[:3]])
+        return np.asarray(J)

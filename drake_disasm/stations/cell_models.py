@@ -70,19 +70,43 @@ def add_adaptive_fingers(
     return spring
 
 
+def hang_bolt(
+    plant: MultibodyPlant, models: CellModels, springs: Springs, p_BoTo_B: np.ndarray
+) -> SixAxisSpring:
+    """Hangs the bolt on a tool without fingers, which it does not collide with.
+
+    Args:
+        plant: not yet finalized.
+        models: of the cell, added to it.
+        springs: at the tool's tcp, along the axes of the bolt as gripped.
+        p_BoTo_B: (3,) of the tcp [m].
+    """
+    tool, bolt = models.tool, models.lock.bolt
+    X_TA = RigidTransform(grasp_rotation(), np.zeros(3))  # A: the springs' axes
+    on_tool = plant.AddFrame(FixedOffsetFrame("tool_springs", tool.frame_T, X_TA))
+    on_bolt = plant.AddFrame(
+        FixedOffsetFrame("hung", bolt.body_frame(), RigidTransform(p_BoTo_B))
+    )
+    spring = SixAxisSpring(plant, "tool_compliance", on_tool, springs)
+    plant.WeldFrames(spring.last.body_frame(), on_bolt)
+    return spring
+
+
 def add_cell(
     plant: MultibodyPlant,
     frame_Gn: Frame,
     scenario: Scenario,
     environment: Environment | None = None,
+    is_welded: bool = False,
 ) -> CellModels:
-    """Adds arm, tool, lock and bench; welds the bolt if the scenario says so.
+    """Adds arm, tool, lock and bench.
 
     Args:
         plant: not yet finalised.
         frame_Gn: the groove's nominal frame, fixed in the world.
         scenario: of the cell.
         environment: of the default Context; None is the nominal one.
+        is_welded: whether the bolt is fixed to the gripper's tcp.
 
     Raises:
         DisasmError: a model file is missing or is of another device.
@@ -94,7 +118,7 @@ def add_cell(
     if under:
         body = under.frame_S.body()
         bench += plant.GetCollisionGeometriesForBody(body)
-    if scenario.gripper.hold == "weld":
+    if is_welded:
         bolt = lock.bolt.body_frame()
         plant.WeldFrames(tool.frame_T, bolt, grasp_pose(scenario, tool))
     return CellModels(arm, tool, lock, under or tool.sensor, bench)

@@ -334,6 +334,11 @@ def refuse_what_is_simulated(scenario: Scenario) -> None:
             f"randomisation.0 ({parameter}): hardware can't be drawn anew; take it out"
         )
     refuse_twins_contact(scenario)
+    if not scenario.gripper.fingers:
+        raise DisasmError(
+            "gripper.fingers: hardware drives two fingers; name them, or use `station` "
+            "cell"
+        )
 
 
 def _supervisor(
