@@ -68,7 +68,7 @@ def _pressed(kind: str, place: str, *overrides: str) -> TaskSimulation:
 
 @pytest.mark.parametrize("kind", ["cell", "twin", "impact"])
 def test_a_press_reads_the_same_at_every_place(kind: str) -> None:
-    """Without a sensor in the wrist the tool is shorter, and the arm a tenth stiffer."""
+    """Without a sensor in the wrist the tool is shorter, and the arm stiffer."""
     station, *model = ["twin", "contact.model=impact"] if kind == "impact" else [kind]
     wrist, part, none = (
         _pressed(station, place, *model).observation()[6:] for place in PLACES
