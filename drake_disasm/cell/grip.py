@@ -85,13 +85,18 @@ def gripped_inertia(tool: Tool) -> np.ndarray:
 
 
 def finger_springs(gripper: GripperConfig, tool: Tool) -> Springs:
-    """Returns the springs of adaptive fingers between palm and pads."""
+    """Returns the springs of adaptive fingers, or of a tool without fingers."""
     inertia = gripped_inertia(tool)
     return Springs.damped(np.array(gripper.stiffness), gripper.damping_ratio, inertia)
 
 
 def grip_springs(gripper: GripperConfig, tool: Tool) -> Springs:
-    """Returns the springs between palm and bolt: fingers and pads in series."""
+    """Returns the springs between palm and bolt: fingers and pads in series.
+
+    Without fingers they are the tool's own.
+    """
+    if not gripper.fingers:
+        return finger_springs(gripper, tool)
     inertia = gripped_inertia(tool)
     pads = _PADS.copy()
     pads[2] = 2.0 * gripper.finger_stiffness

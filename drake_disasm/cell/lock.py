@@ -13,7 +13,12 @@ from pydrake.geometry import (
     SceneGraph,
 )
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, Frame, RigidBody
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    Frame,
+    RigidBody,
+    SpatialInertia,
+)
 from pydrake.systems.framework import Context
 
 from drake_disasm.effects import Environment
@@ -58,6 +63,7 @@ def add_lock(
     part: Part,
     contact: ContactConfig,
     environment: Environment | None = None,
+    M_fixed: SpatialInertia | None = None,
 ) -> Lock:
     """Adds groove (welded to a movable frame in Gn) and bolt (free) to the plant.
 
@@ -67,11 +73,13 @@ def add_lock(
         part: what they are.
         contact: what they are made of.
         environment: of the default Context; None is the nominal one.
+        M_fixed: inertia of the groove about Go in G, for a sensor that weighs it.
     """
     actual = environment or part.environment(contact)
     frame = plant.AddFrame(FixedOffsetFrame("groove_pose", frame_Gn, actual.X_GnG))
     instance = plant.AddModelInstance("lock")
-    groove = plant.AddRigidBody("groove", instance)  # it never moves
+    M_G = M_fixed or SpatialInertia.Zero()  # it never moves
+    groove = plant.AddRigidBody("groove", instance, M_G)
     plant.WeldFrames(frame, groove.body_frame())
     bolt = plant.AddRigidBody("bolt", plant.AddModelInstance("bolt"), part.M_moved_B)
     fixed, moved = part.fixed_solids(actual), part.moved_solids

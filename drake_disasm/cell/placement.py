@@ -6,7 +6,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from drake_disasm.parts import Part
 from drake_disasm.scenario import PlacementConfig
 
-_MIDDLE = 0.02  # m along the groove, where the bench's middle is
+#: Where along the groove the middle of the bench is [m].
+MIDDLE = 0.02
 
 
 def nominal_groove_pose(placement: PlacementConfig) -> RigidTransform:
@@ -22,4 +23,4 @@ def bench_top(X_WG: RigidTransform, part: Part) -> np.ndarray:
         X_WG: nominal groove frame.
         part: what lies on it.
     """
-    return np.asarray(X_WG @ np.array([_MIDDLE, part.bottom, 0.0]))
+    return np.asarray(X_WG @ np.array([MIDDLE, part.bottom, 0.0]))

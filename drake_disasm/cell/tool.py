@@ -17,10 +17,10 @@ from pydrake.multibody.tree import (
     PrismaticJoint,
     RigidBody,
     SpatialInertia,
-    WeldJoint,
 )
 
 from drake_disasm.cell.parsing import add_model, model_frame
+from drake_disasm.cell.sensor import SensorModel, add_sensor
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.scenario import GripperConfig, Scenario
@@ -30,12 +30,14 @@ from drake_disasm.scenario import GripperConfig, Scenario
 class Tool:
     """Rigid geometry and mass of everything beyond the sensor's joint.
 
+    Without a sensor in the wrist that is all on the flange, and S is F.
+
     Attributes:
         X_FB, X_SB: pose of the bolt, as grasped, in flange and sensor frame.
         X_TB: pose of the bolt, as grasped, in the gripper's tcp.
         M_F: spatial inertia about Fo in F, sensor's body and bolt included.
         M_palm_F: the same without fingers and bolt.
-        M_fingers_B: spatial inertia of the fingers about Bo in B.
+        M_fingers_B: spatial inertia of the fingers about Bo in B; zero without any.
         M_bolt_B: of the bolt.
         p_SoScm_S: centre of mass in the sensor frame (3,) [m].
     """
@@ -56,7 +58,7 @@ class Tool:
 
     @property
     def p_BoTo_B(self) -> np.ndarray:
-        """The middle of the pads, where the fingers' compliance is, (3,) in B [m]."""
+        """The gripper's tcp, where its compliance is, (3,) in B [m]."""
         return self.X_TB.inverse().translation()
 
     @property
@@ -91,7 +93,9 @@ class Tool:
             X_TB=X_TB,
             M_F=M_F,
             M_palm_F=plant.CalcSpatialInertia(context, plant.world_frame(), palm),
-            M_fingers_B=plant.CalcSpatialInertia(context, bolt.body_frame(), fingers),
+            M_fingers_B=plant.CalcSpatialInertia(context, bolt.body_frame(), fingers)
+            if fingers
+            else SpatialInertia.Zero(),
             M_bolt_B=M_bolt_B,
             p_SoScm_S=X_SF @ M_F.get_com(),
         )
@@ -102,58 +106,58 @@ class ToolModels:
     """Handles of sensor and gripper in a plant.
 
     Attributes:
-        sensor_joint: the weld between flange and sensor whose reaction is read.
-        frame_S, frame_T: sensing frame and tool centre point.
-        frame_tip: where the pads end along z_T.
-        carriage: body that carries the fingers, fixed to the palm.
-        fingers: the joints of the two fingers.
-        sensor, gripper: model instances.
+        frame_S, frame_T: sensing frame (the flange without a sensor in the wrist), and
+            tool centre point.
+        frame_tip: where the pads, or a tool without fingers, end along z_T.
+        carriage: body that carries the fingers, fixed to the palm, or else the tool.
+        fingers: the joints of the two fingers, or none.
+        sensor: in the wrist, or None.
+        gripper: model instance.
     """
 
-    sensor_joint: WeldJoint
     frame_S: Frame
     frame_T: Frame
     frame_tip: Frame
     carriage: RigidBody
-    fingers: tuple[PrismaticJoint, PrismaticJoint]
-    sensor: ModelInstanceIndex
+    fingers: tuple[PrismaticJoint, ...]
+    sensor: SensorModel | None
     gripper: ModelInstanceIndex
 
     @property
-    def instances(self) -> tuple[ModelInstanceIndex, ModelInstanceIndex]:
-        """Both model instances."""
-        return self.sensor, self.gripper
+    def instances(self) -> tuple[ModelInstanceIndex, ...]:
+        """The model instances."""
+        return (*([self.sensor.instance] if self.sensor else []), self.gripper)
 
 
 def add_tool(plant: MultibodyPlant, frame_F: Frame, scenario: Scenario) -> ToolModels:
-    """Adds the sensor to the flange and the gripper to the sensor.
+    """Adds the sensor to the flange, if it is in the wrist, and the gripper to it.
 
-    The sensor's link, its origin on the robot-side face, sits on F. The weld's child
-    frame is S, so the joint's reaction is what is sensed there.
+    Without one S is the gripper's base, on the flange.
 
     Raises:
         DisasmError: a model file is missing or is of another device.
     """
-    url = scenario.ft_sensor.model
-    sensor = add_model(plant, url)
-    frame_S = model_frame(plant, sensor, "sensor", url)
-    joint = plant.WeldFrames(frame_F, frame_S, frame_S.GetFixedPoseInBodyFrame())
-    tool_side = model_frame(plant, sensor, "tool_side", url)
+    on, sensor = frame_F, None
+    if scenario.ft_sensor.place == "wrist":
+        sensor = add_sensor(plant, frame_F, scenario.ft_sensor.model)
+        on = sensor.tool_side
     url = scenario.gripper.model
     gripper = add_model(plant, url)
-    plant.WeldFrames(tool_side, model_frame(plant, gripper, "gripper_base", url))
+    base = model_frame(plant, gripper, "gripper_base", url)
+    plant.WeldFrames(on, base)
+    frame_S = sensor.frame_S if sensor else base
     frame_T = model_frame(plant, gripper, "tcp", url)
-    frame_tip = model_frame(plant, gripper, "fingertip", url)
-    carriage = model_frame(plant, gripper, "finger_carriage", url).body()
+    frame_tip, carriage = frame_T, frame_T.body()
+    if scenario.gripper.fingers:
+        frame_tip = model_frame(plant, gripper, "fingertip", url)
+        carriage = model_frame(plant, gripper, "finger_carriage", url).body()
     fingers = _fingers(plant, gripper, scenario.gripper)
-    return ToolModels(
-        joint, frame_S, frame_T, frame_tip, carriage, fingers, sensor, gripper
-    )
+    return ToolModels(frame_S, frame_T, frame_tip, carriage, fingers, sensor, gripper)
 
 
 def _fingers(
     plant: MultibodyPlant, instance: ModelInstanceIndex, gripper: GripperConfig
-) -> tuple[PrismaticJoint, PrismaticJoint]:
+) -> tuple[PrismaticJoint, ...]:
     """Returns the joints of the fingers, or refuses a gripper that has others."""
     joints = [plant.get_joint(index) for index in plant.GetJointIndices(instance)]
     moving = {each.name(): each for each in joints if each.num_velocities() > 0}
@@ -164,17 +168,20 @@ def _fingers(
                 f"gripper.fingers: {gripper.model} has no movable joint '{name}'; "
                 f"{closest(name, names)}"
             )
-    left, right = (moving[name] for name in gripper.fingers)
-    is_pair = all(isinstance(each, PrismaticJoint) for each in (left, right))
-    if len(moving) != 2 or left is right or not is_pair:
+    fingers = tuple(moving[name] for name in gripper.fingers)
+    are_sliding = all(isinstance(each, PrismaticJoint) for each in fingers)
+    if set(gripper.fingers) != set(names) or not are_sliding:
         raise DisasmError(
             f"gripper.model: {gripper.model} moves by {', '.join(names)}; a gripper "
-            "here has two sliding fingers: make the other joints fixed"
+            "here has two sliding fingers, named by gripper.fingers, or none: make the "
+            "other joints fixed"
         )
-    return left, right
+    return fingers
 
 
 def _refuse_wide_grasp(scenario: Scenario, models: ToolModels) -> None:
+    if not models.fingers:
+        return
     width = scenario.part.grip_width
     opening = sum(joint.position_upper_limit() for joint in models.fingers)
     if width > opening:

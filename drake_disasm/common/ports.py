@@ -41,7 +41,7 @@ class Port:
     is_input: bool = False
 
 
-_WRENCH_FRAME = "load on the sensor, at So, in S, [f; tau], untared"
+_WRENCH_FRAME = "load on the sensor (none: the flange), at So, in S, [f; tau], untared"
 
 
 def _device(name: str) -> tuple[Port, ...]:

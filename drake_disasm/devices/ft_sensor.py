@@ -1,15 +1,13 @@
 """The force/torque sensor, as the simulated stations carry it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.math import RigidTransform
-from pydrake.multibody.math import SpatialForce
-from pydrake.multibody.tree import BodyIndex, JointIndex
 from pydrake.systems.framework import (
     BasicVector,
     Context,
+    DependencyTicket,
     DiscreteValues,
     EventStatus,
     LeafSystem,
@@ -18,11 +16,8 @@ from pydrake.systems.framework import (
 from drake_disasm.common.arrays import Array, namespace
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.ports import Health
-from drake_disasm.common.spatial import (
-    shift_and_express,
-    wrench_from_spatial_force,
-)
 from drake_disasm.common.timing import newest_step
+from drake_disasm.devices.load_source import LoadSource
 from drake_disasm.devices.sensor_chain import (
     Payload,
     memory_size,
@@ -37,21 +32,18 @@ MOST_REMEMBERED = 512
 
 
 class ForceTorqueSensor(LeafSystem):
-    """Turns a joint's reaction into what an OnRobot HEX-E would report.
+    """Turns a load into what an OnRobot HEX-E would report.
 
     The reading is the load on the sensor at So in S, [f; tau], untared: a mass
-    that hangs on it reads downwards. It is minus the joint's reaction on the
-    sensor (Drake's, [tau; f]), through the effects, plus noise, in whole counts.
-    While there has been no step yet, `health` is NO_DATA and the load is that at
-    rest, if `set_load_at_rest` has told it.
+    that hangs on it reads downwards. It is the source's load through the effects,
+    plus noise, in whole counts. While there has been no step yet, `health` is NO_DATA
+    and the load is that at rest, if `set_load_at_rest` has told it.
 
     @system
     name: ForceTorqueSensor
     input_ports:
-    - reaction_forces
-    - body_poses
     - noise
-    - mount_coordinates (where `mount` is given)
+    - those of `source`
     output_ports:
     - wrench
     - health
@@ -60,67 +52,47 @@ class ForceTorqueSensor(LeafSystem):
 
     Args:
         config: noise and quantum per channel.
-        joint: the joint whose reaction is read, its child frame being S.
-        body: a body that S is fixed to, and X_BodyS its pose there.
+        source: of the load.
         payload: that hangs on the sensor.
-        time_step: of the plant whose reaction is read [s].
+        time_step: of the plant whose load is read [s].
         effects: of the default Context, in the order of the chain.
-        mount: X_WS of (6,) coordinates, for a sensor that is elsewhere than the joint's
-            child frame: a massless spring between them transmits the load.
     """
 
     def __init__(
         self,
         config: SensorConfig,
-        joint: JointIndex,
-        body: BodyIndex,
-        X_BodyS: RigidTransform,
+        source: LoadSource,
         payload: Payload,
         time_step: float,
         effects: Sequence[SensorEffect] = (),
-        mount: Callable[[np.ndarray], RigidTransform] | None = None,
     ) -> None:
         super().__init__()
         _refuse_too_many_memories(effects)
         self._noise, self._quantum = np.array(config.noise), np.array(config.quantum)
-        self._joint, self._body = int(joint), int(body)
-        self._X_BodyS, self._payload = X_BodyS, payload
+        self._source, self._payload = source, payload
         self._time_step = time_step
         self._effects = self.DeclareAbstractParameter(Value[object](tuple(effects)))
         self._load_at_rest: np.ndarray | None = None
-        self._reaction = self.DeclareAbstractInputPort(
-            "reaction_forces", Value[list[SpatialForce]]()
-        )
-        self._poses = self.DeclareAbstractInputPort(
-            "body_poses", Value[list[RigidTransform]]()
-        )
+        of_load = source.declare(self)
         self._noise_port = self.DeclareVectorInputPort("noise", 6)
-        self._mount = mount
-        if mount:
-            self._coordinates = self.DeclareVectorInputPort("mount_coordinates", 6)
         self._memory = self.DeclareDiscreteState(MOST_REMEMBERED)
         self._remembered = self.DeclareDiscreteState([np.nan])  # when [s]
         self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._update)
-        self._declare_outputs()
+        self._declare_outputs(of_load)
 
-    def _declare_outputs(self) -> None:
+    def _declare_outputs(self, of_load: set[DependencyTicket]) -> None:
         # Not the time: between two plant steps the sensor has no new sample, and
         # what depends on time takes that of the newest step.
-        reaction = self._reaction.ticket()
-        tickets = {
-            reaction,
-            self._poses.ticket(),
+        tickets = of_load | {
             self._noise_port.ticket(),
             self.xd_ticket(),
             self.all_parameters_ticket(),
         }
-        if self._mount:
-            tickets.add(self._coordinates.ticket())
         self.DeclareVectorOutputPort(
             "wrench", 6, self._calc_wrench, prerequisites_of_calc=tickets
         )
         self.DeclareVectorOutputPort(
-            "health", 1, self._calc_health, prerequisites_of_calc={reaction}
+            "health", 1, self._calc_health, prerequisites_of_calc=of_load
         )
         self.DeclareVectorOutputPort("time_measured", 1, self._calc_time)
 
@@ -148,13 +120,10 @@ class ForceTorqueSensor(LeafSystem):
 
     def load(self, context: Context) -> np.ndarray:
         """Returns the load on the sensor (6,), [f; tau] at So in S."""
-        load = -wrench_from_spatial_force(self._reaction.Eval(context)[self._joint])
-        if not load.any():
-            return load if self._load_at_rest is None else self._load_at_rest
-        if not self._mount:
+        load = self._source.load(context)
+        if load.any() or self._load_at_rest is None:
             return load
-        X_WJc = self._X_WJc(context)
-        return shift_and_express(load, self._X_WS(context).inverse() @ X_WJc)
+        return self._load_at_rest
 
     def reading_at_zeroing(self, context: Context) -> np.ndarray:
         """Returns the noise-free mean (6,) of readings that zeroing averages.
@@ -168,22 +137,8 @@ class ForceTorqueSensor(LeafSystem):
         """Returns what `set_effects` put there."""
         return context.get_abstract_parameter(self._effects).get_value()
 
-    def _X_WJc(self, context: Context) -> RigidTransform:
-        """Returns the pose of the joint's child frame."""
-        return self._poses.Eval(context)[self._body] @ self._X_BodyS
-
-    def _X_WS(self, context: Context) -> RigidTransform:
-        if self._mount:
-            return self._mount(self._coordinates.Eval(context))
-        return self._X_WJc(context)
-
-    def _has_stepped(self, context: Context) -> bool:
-        """Returns whether the plant has made a step: its reactions are zero before."""
-        F = self._reaction.Eval(context)[self._joint]
-        return bool(np.any(F.get_coeffs() != 0.0))
-
     def _sensing(self, context: Context, time: float) -> Sensing:
-        R_WS = self._X_WS(context).rotation().matrix()
+        R_WS = self._source.R_WS(context)
         return self._payload.sensing(np.array(time), R_WS)
 
     def _chain(self, context: Context, time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -215,7 +170,7 @@ class ForceTorqueSensor(LeafSystem):
         output.SetFromVector(quantise(wrench, self._quantum))
 
     def _calc_health(self, context: Context, output: BasicVector) -> None:
-        stepped = self._has_stepped(context)
+        stepped = self._source.load(context).any()
         output.SetFromVector([Health.READY if stepped else Health.NO_DATA])
 
     def _calc_time(self, context: Context, output: BasicVector) -> None:

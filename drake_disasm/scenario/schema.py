@@ -121,34 +121,44 @@ class GripperConfig:
     y out of the plate, z across, along which the fingers close) in the middle of the
     pads. No figure of the real gripper is known; these are assumed, as the ones with
     which the thesis's numbers can be reproduced (docs/explanation/physics.md).
+
+    A tool without driven joints (`fingers: []`), such as a suction cup, holds the bolt
+    by these springs at its tcp; commands to open or close it are ignored.
     """
 
     model: str = quantity(
         "package://disasm_models/gripper_2f140/gripper_2f140.urdf",
         "",
-        "URDF with the frames gripper_base, finger_carriage, tcp and fingertip",
+        "URDF with the frames gripper_base and tcp; with fingers also finger_carriage "
+        "and fingertip",
     )
     fingers: list[str] = quantity(
         ["left_finger_joint", "right_finger_joint"], "",
-        "sliding joints of the model, at 0 where the pads meet",
+        "two sliding joints of the model, at 0 where the pads meet; or none",
+        any_length=True,
     )  # fmt: skip
     hold: str = quantity(
-        "friction", "", "how the bolt is held", choices=("friction", "weld")
+        "friction", "", "how fingers hold the bolt", choices=("friction", "weld")
     )
     compliance: str = quantity(
         "adaptive", "", "of the fingers against the palm; adaptive: the springs of "
         "`stiffness`; rigid: none", choices=("adaptive", "rigid"),
     )  # fmt: skip
     stiffness: list[float] = quantity(
-        [600.0, 600.0, 600.0, 10.0, 10.0, 10.0], "N/m, N m/rad", "of adaptive fingers",
+        [600.0, 600.0, 600.0, 10.0, 10.0, 10.0], "N/m, N m/rad",
+        "of adaptive fingers, or of a tool without fingers",
         low=1.0, high=1e6,
     )  # fmt: skip
     damping_ratio: float = quantity(
-        1.0, "1", "of adaptive fingers that hold the bolt", low=0.1, high=5.0
+        1.0, "1", "of these springs with what they hold", low=0.1, high=5.0
     )
     grip_force: float = quantity(60.0, "N", "on each pad", low=10.0, high=125.0)
     fingertip_gap: float = quantity(
-        0.0015, "m", "between fingertips and plate", low=0.001, high=0.05
+        0.0015,
+        "m",
+        "between fingertips, or a tool's end, and plate",
+        low=0.001,
+        high=0.05,
     )
     finger_stiffness: float = quantity(
         3e4, "N/m", "of each finger about its commanded place", low=1e3, high=1e6
@@ -159,6 +169,11 @@ class GripperConfig:
 class SensorConfig:
     """OnRobot HEX-E: noise and resolution per channel [f; tau] in S."""
 
+    place: str = quantity(
+        "wrist", "", "where the wrench is measured: between flange and gripper; under "
+        "the fixed part; or none: estimated from the joints' torques, S on the flange",
+        choices=("wrist", "part", "none"),
+    )  # fmt: skip
     model: str = quantity("package://disasm_models/hex_e/hex_e.urdf", "", "URDF")
     period: float = quantity(0.01, "s", "between samples", low=0.002, high=1.0)
     noise: list[float] = quantity(

@@ -10,6 +10,7 @@ from drake_disasm.parts import AXES
 from drake_disasm.scenario.randomisation import corner, refuse_broken_ranges
 from drake_disasm.scenario.schema import (
     CartesianImpedanceConfig,
+    GripperConfig,
     Scenario,
 )
 
@@ -47,6 +48,8 @@ def _validate_one(scenario: Scenario) -> None:
     _refuse_impossible_stiffness(scenario.arm.cartesian_impedance)
     scenario.part.refuse_impossible()
     _refuse_unreachable_end(scenario)
+    _refuse_small_angles(scenario)
+    _refuse_other_fingers(scenario.gripper)
 
 
 def _refuse_unregistered(scenario: Scenario) -> None:
@@ -114,4 +117,26 @@ def _refuse_unreachable_end(scenario: Scenario) -> None:
         raise DisasmError(
             f"task.travel_success: the way along {AXES[stage.axis]} ends after "
             f"{end:g} m, {task.travel_success:g} m is never reached; give less"
+        )
+
+
+def _refuse_small_angles(scenario: Scenario) -> None:
+    """The thesis's equations are those of a sensor that moves with the bolt."""
+    if scenario.ft_sensor.place == "part" and scenario.observation.variant != "exact":
+        raise DisasmError(
+            "observation.variant: 'small_angle' is for a sensor that moves with the "
+            "bolt; set it to exact, or ft_sensor.place to wrist"
+        )
+
+
+def _refuse_other_fingers(gripper: GripperConfig) -> None:
+    if len(gripper.fingers) not in (0, 2):
+        raise DisasmError(
+            f"gripper.fingers: {len(gripper.fingers)} given; name two sliding joints, "
+            "or none ([]) for a tool that has none, such as a suction cup"
+        )
+    if not gripper.fingers and gripper.compliance == "rigid":
+        raise DisasmError(
+            "gripper.compliance: 'rigid' is of fingers, and gripper.fingers is empty; "
+            "raise gripper.stiffness instead"
         )

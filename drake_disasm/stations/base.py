@@ -15,6 +15,7 @@ from pydrake.systems.primitives import RandomSource
 from drake_disasm.cell.arm_model import arm_joints
 from drake_disasm.cell.coordinates import ArmCoordinates, Coordinates
 from drake_disasm.cell.placement import nominal_groove_pose
+from drake_disasm.cell.sensor import sensor_under_part
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.ports import Port, cell_ports
@@ -74,6 +75,7 @@ class Station(Diagram):
         coordinates: maps the arm's coordinates to X_GB and back.
         start: the coordinates (n,) at which an episode starts, X_GB = identity.
         X_SB: the bolt in the sensor frame, as grasped.
+        X_GS: a sensor under the fixed part, in Gn; None: it moves with the bolt.
         payload_mass, p_SoScm_S: what the sensor carries [kg], (3,) [m].
         X_WG: the groove's nominal frame in the world.
         g_W: gravity (3,) [m/s^2].
@@ -92,6 +94,7 @@ class Station(Diagram):
     coordinates: Coordinates
     start: np.ndarray
     X_SB: RigidTransform
+    X_GS: RigidTransform | None = None
     payload_mass: float
     p_SoScm_S: np.ndarray
     X_WG: RigidTransform
@@ -145,6 +148,7 @@ class Station(Diagram):
             self.payload_mass,
             self.p_SoScm_S,
             self.g_W,
+            self.X_GS,
         )
 
     @property
@@ -230,12 +234,23 @@ class Station(Diagram):
         self.control_period = scenario.arm.control_period
         self.X_WG = nominal_groove_pose(scenario.placement)
         self.X_SB = tool.X_SB
-        self.payload_mass, self.p_SoScm_S = tool.mass, tool.p_SoScm_S
+        self._set_payload(tool.mass, tool.p_SoScm_S)
         self.coordinates = ArmCoordinates(
             scenario.arm, self.X_WG, tool.X_FB, scenario.task.period
         )
         self.start = self.coordinates.start(RigidTransform())
         return tool
+
+    def _set_payload(self, mass: float, p_SoScm_S: np.ndarray) -> None:
+        """Sets what the sensor carries; under the fixed part, that is the part.
+
+        Args:
+            mass, p_SoScm_S: of what moves with the bolt [kg], (3,) [m].
+        """
+        if self.scenario.ft_sensor.place == "part":
+            self.X_GS, M_S = sensor_under_part(self.scenario)
+            mass, p_SoScm_S = M_S.get_mass(), M_S.get_com()
+        self.payload_mass, self.p_SoScm_S = mass, p_SoScm_S
 
 
 def refuse_twins_contact(scenario: Scenario) -> None:

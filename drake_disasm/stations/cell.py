@@ -22,17 +22,23 @@ from pydrake.systems.primitives import (
 
 from drake_disasm.cell.arm_control import joint_gains
 from drake_disasm.cell.arm_dynamics import ArmDynamics
+from drake_disasm.cell.arm_wrench import ArmWrench
 from drake_disasm.cell.grip import AXIS_ORDER, finger_springs
+from drake_disasm.devices.load_source import JointReaction, JointTorques
 from drake_disasm.effects import ArmEffect
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations.arm_mechanics import ArmMechanics, refuse_unknown_arm_effects
 from drake_disasm.stations.base import refuse_twins_contact
-from drake_disasm.stations.cell_models import add_adaptive_fingers, add_cell
+from drake_disasm.stations.cell_models import add_adaptive_fingers, add_cell, hang_bolt
 from drake_disasm.stations.contact import exclude_collisions
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
 from drake_disasm.stations.start_collisions import refuse_collisions
-from drake_disasm.stations.wiring import export_ready_device, export_required
+from drake_disasm.stations.wiring import (
+    export_ready_device,
+    export_required,
+    reaction_ports,
+)
 from drake_disasm.systems.cartesian_impedance import CartesianImpedance
 
 _PAD_INDENTATION = 3e-5  # m, of a pad (20 MPa, 7.5 mm thick) under some 60 N
@@ -102,7 +108,9 @@ class CellStation(SimulatedStation):
         config = self.scenario
         frame_Gn = self._add_plant(builder, config.simulation.cell_time_step)
         plant = self.plant
-        self._models = models = add_cell(plant, frame_Gn, config, self._environment)
+        self._models = models = add_cell(
+            plant, frame_Gn, config, self._environment, self._is_welded
+        )
         self.arm_instance = models.arm.instance
         self.tool_models, self.lock = models.tool, models.lock
         # A groove that is tilted sinks into the bench, and the bolt in it.
@@ -110,20 +118,53 @@ class CellStation(SimulatedStation):
         exclude_collisions(self.scene_graph, inside, models.bench)
         effects = [e for e in self._default_effects if isinstance(e, ArmEffect)]
         self._mechanics = ArmMechanics(plant, models.arm, effects)
-        fingers = None
-        if config.gripper.compliance == "adaptive":
-            springs = finger_springs(config.gripper, self.tool)
-            fingers = add_adaptive_fingers(plant, self.tool_models, springs)
+        compliance = self._add_compliance()
         plant.Finalize()
         self._set_gains()
-        self._wire_arm(builder)
+        measured = self._wire_arm(builder)
         self._wire_gripper(builder)
-        if fingers:
-            self._wire_adaptive_fingers(builder, fingers)
-        self._add_sensor(
-            builder, self.tool_models.sensor_joint, self.tool_models.frame_S
-        )
+        if compliance:
+            self._wire_compliance(builder, compliance)
+        if models.sensor:
+            source = JointReaction(models.sensor.joint, models.sensor.frame_S)
+            self._add_sensor(builder, source, reaction_ports(plant))
+        else:
+            arm, n = ArmWrench(config.arm), len(self.joints)
+            torques = JointTorques(arm, n, self.time_step)
+            self._add_sensor(builder, torques, measured)
         self._finish(builder)
+
+    @property
+    def _is_welded(self) -> bool:
+        """Whether fingers are fixed to the bolt."""
+        gripper = self.scenario.gripper
+        return bool(gripper.fingers) and gripper.hold == "weld"
+
+    @property
+    def _is_apart(self) -> bool:
+        """Whether the bolt is held by friction alone."""
+        gripper = self.scenario.gripper
+        return bool(gripper.fingers) and gripper.hold == "friction"
+
+    def _add_compliance(self) -> SixAxisSpring | None:
+        """Adds the springs of the gripper, if it has any."""
+        gripper = self.scenario.gripper
+        if gripper.compliance == "rigid":
+            return None
+        springs = finger_springs(gripper, self.tool)
+        if gripper.fingers:
+            return add_adaptive_fingers(self.plant, self.tool_models, springs)
+        instance = self.tool_models.gripper
+        of_bolt, of_tool = (
+            [g for b in bodies for g in self.plant.GetCollisionGeometriesForBody(b)]
+            for bodies in (
+                [self.lock.bolt],
+                map(self.plant.get_body, self.plant.GetBodyIndices(instance)),
+            )
+        )
+        exclude_collisions(self.scene_graph, of_bolt, of_tool)
+        p_BoTo_B = self.tool.p_BoTo_B
+        return hang_bolt(self.plant, self._models, springs, p_BoTo_B)
 
     def _set_gains(self) -> None:
         plant, gripper = self.plant, self.scenario.gripper
@@ -137,7 +178,8 @@ class CellStation(SimulatedStation):
             k = gripper.finger_stiffness
             _set_spring(plant, index, k, 2.0 * np.sqrt(k * _FINGER_MASS))
 
-    def _wire_arm(self, builder: DiagramBuilder) -> None:
+    def _wire_arm(self, builder: DiagramBuilder) -> dict[str, OutputPort]:
+        """Adds the arm's controller; returns what is measured of the joints."""
         plant, connect, n = self.plant, builder.Connect, len(self.joints)
         command = builder.AddNamedSystem("arm_command", PassThrough(n))
         export_required(
@@ -171,6 +213,7 @@ class CellStation(SimulatedStation):
         for quantity, port in outputs.items():
             builder.ExportOutput(port, f"{self.arm}.{quantity}")
         export_ready_device(builder, self.arm, self.time_step)
+        return {"position": position, "velocity": velocity, "torque": measured}
 
     @staticmethod
     def _in_halves(
@@ -224,7 +267,7 @@ class CellStation(SimulatedStation):
         contact = self.plant.get_generalized_contact_forces_output_port(
             self.arm_instance
         )
-        if self.scenario.gripper.hold == "weld":
+        if not self._is_apart:
             return contact
         X_FB, plant = self.tool.X_FB, self._dynamics.plant
         context = plant.CreateDefaultContext()
@@ -248,6 +291,9 @@ class CellStation(SimulatedStation):
 
     def _wire_gripper(self, builder: DiagramBuilder) -> None:
         plant, gripper = self.plant, self.tool_models.gripper
+        if not self.scenario.gripper.fingers:
+            self._export_idle_gripper(builder)
+            return
         halves = np.array([[0.5], [0.5], [0.0], [0.0]])
         fingers = builder.AddNamedSystem("gripper_fingers", MatrixGain(D=halves))
         export_required(
@@ -265,30 +311,37 @@ class CellStation(SimulatedStation):
         builder.ExportOutput(opening.get_output_port(), "gripper.state_measured")
         export_ready_device(builder, "gripper", self.time_step)
 
-    def _wire_adaptive_fingers(
-        self, builder: DiagramBuilder, fingers: SixAxisSpring
-    ) -> None:
+    def _export_idle_gripper(self, builder: DiagramBuilder) -> None:
+        """Exports the ports of a gripper that can't open: commands are ignored."""
+        ignored = builder.AddNamedSystem("gripper_ignored", PassThrough(1))
+        builder.ExportInput(ignored.get_input_port(), "gripper.position")
+        shut = builder.AddNamedSystem("gripper_shut", ConstantVectorSource(np.zeros(2)))
+        builder.ExportOutput(shut.get_output_port(), "gripper.state_measured")
+        export_ready_device(builder, "gripper", self.time_step)
+
+    def _wire_compliance(self, builder: DiagramBuilder, spring: SixAxisSpring) -> None:
         """Lets the springs rest where the bolt is gripped, weight included.
 
         The gripper closes about a bolt that is in its place: the springs carry fingers
         and bolt as they hang at the start, and yield to what changes.
         """
-        plant = self.plant
+        plant, instance = self.plant, spring.instance
+        name = plant.GetModelInstanceName(instance)
         rest = builder.AddNamedSystem(
-            "adaptive_fingers_rest", ConstantVectorSource(np.zeros(12))
+            f"{name}_rest", ConstantVectorSource(np.zeros(12))
         )
         carried = builder.AddNamedSystem(
-            "adaptive_fingers_load", ConstantVectorSource(self._weight_on_fingers())
+            f"{name}_load", ConstantVectorSource(self._weight_on_springs())
         )
         builder.Connect(
-            rest.get_output_port(), plant.get_desired_state_input_port(fingers.instance)
+            rest.get_output_port(), plant.get_desired_state_input_port(instance)
         )
         builder.Connect(
-            carried.get_output_port(), plant.get_actuation_input_port(fingers.instance)
+            carried.get_output_port(), plant.get_actuation_input_port(instance)
         )
 
-    def _weight_on_fingers(self) -> np.ndarray:
-        """Returns the forces (6,) that keep fingers and bolt where they are at A."""
+    def _weight_on_springs(self) -> np.ndarray:
+        """Returns the forces (6,) that keep what the springs hold where it is at A."""
         M_B, g_W = self.tool.M_gripped_B, self.g_W
         R_BW = self.X_WG.rotation().inverse().matrix()  # B coincides with G there
         f_B = M_B.get_mass() * (R_BW @ g_W)
@@ -324,7 +377,7 @@ class CellStation(SimulatedStation):
         plant.SetPositions(plant_context, self.arm_instance, self.start)
         for finger in self.tool_models.fingers:
             finger.set_translation(plant_context, self._start_opening / 2)
-        if self.scenario.gripper.hold == "friction":
+        if self._is_apart:
             plant.SetFreeBodyPose(plant_context, self.lock.bolt, self.X_WG)
 
     @property
@@ -341,9 +394,12 @@ def _grip_command(scenario: Scenario) -> float:
     """Returns the opening [m] to command so that the pads press with the grip force.
 
     Fingers yield like springs (the real drive is self-locking), so they are
-    sent to a place inside the grip. A welded bolt is only touched.
+    sent to a place inside the grip. A welded bolt is only touched. Without fingers it
+    is 0.
     """
     gripper, width = scenario.gripper, scenario.part.grip_width
+    if not gripper.fingers:
+        return 0.0
     if gripper.hold == "weld":
         return width + 0.002
     return width - 2.0 * gripper.grip_force / gripper.finger_stiffness

@@ -11,6 +11,7 @@ from drake_disasm.common.ports import Health
 from drake_disasm.devices.iiwa import (
     CommandChannel,
     CommandMonitor,
+    EstimatedWrench,
     IiwaStatusMonitor,
     encode_command,
 )
@@ -43,6 +44,8 @@ class CellDevices:
         clock: see above.
         wait: lets a time [s] pass while devices answer.
         lcm: see above; None is the configured one.
+        estimated: the reading by the arm's state, see `EstimatedWrench`; None is that
+            of a sensor.
     """
 
     def __init__(
@@ -52,14 +55,12 @@ class CellDevices:
         clock: Clock,
         wait: Callable[[float], None],
         lcm: DrakeLcm | None,
+        estimated: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     ) -> None:
         self._config, self.clock, self._wait = config, clock, wait
         self.lcm = lcm or DrakeLcm(config.iiwa.lcm_url)
         self.checked_lcm = DrakeLcm("memq://")
         sensor, iiwa = config.ft_sensor, config.iiwa
-        self._sensor = HexClient(
-            sensor.address, sensor.port, sensor.period, sensor.filter_hz, clock
-        )
         grip = dataclasses.replace(
             config.gripper, activate=config.gripper.activate and is_commanded
         )
@@ -67,6 +68,13 @@ class CellDevices:
         self._gripper = RobotiqClient(settings, clock)
         self._arm = IiwaStatusMonitor(
             self.lcm, self.checked_lcm, iiwa.status_channel, iiwa.status_period, clock
+        )
+        self._sensor: HexClient | EstimatedWrench = (
+            EstimatedWrench(self._arm, estimated)
+            if estimated
+            else HexClient(
+                sensor.address, sensor.port, sensor.period, sensor.filter_hz, clock
+            )
         )
         self.clients: dict[str, Readable] = {
             "iiwa": self._arm,
@@ -76,7 +84,8 @@ class CellDevices:
         channel = CommandChannel(self.lcm, iiwa.command_channel)
         self.commands = CommandMonitor(channel, lambda: self._arm.commanded)
         self.is_commanded = is_commanded
-        self._locks = DeviceLocks(_used(config, self.lcm.get_lcm_url(), is_commanded))
+        used = _used(config, self.lcm.get_lcm_url(), is_commanded, not estimated)
+        self._locks = DeviceLocks(used)
 
     def connect(self) -> None:
         """Starts the clients; calling it again restarts the sensor's stream.
@@ -199,7 +208,9 @@ class CellDevices:
         )
 
 
-def _used(config: HardwareConfig, lcm_url: str, is_commanded: bool) -> dict[str, str]:
+def _used(
+    config: HardwareConfig, lcm_url: str, is_commanded: bool, has_sensor: bool
+) -> dict[str, str]:
     """Returns the devices that are one program's alone: address to what it does.
 
     Another program's dry run would take the sensor's stream, and break into the
@@ -209,7 +220,8 @@ def _used(config: HardwareConfig, lcm_url: str, is_commanded: bool) -> dict[str,
     sensor, gripper = config.ft_sensor, config.gripper
     is_serial = gripper.transport == "serial"
     port = "" if is_serial else f":{gripper.port}"
-    return ({arm: "commands this robot"} if arm and is_commanded else {}) | {
-        f"ft_sensor at {sensor.address}:{sensor.port}": "has the sensor's stream",
-        f"gripper at {gripper.address}{port}": "talks to the gripper",
-    }
+    used = {f"gripper at {gripper.address}{port}": "talks to the gripper"}
+    if has_sensor:
+        stream = f"ft_sensor at {sensor.address}:{sensor.port}"
+        used = {stream: "has the sensor's stream"} | used
+    return ({arm: "commands this robot"} if arm and is_commanded else {}) | used

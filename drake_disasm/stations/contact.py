@@ -129,6 +129,7 @@ class ImpactContactForce(ContactStrategy):
         R_WGn, time_step: of the station [s].
         p_BoTo_B: (3,) where the spring is [m].
         environment: of the default Context.
+        is_weighed: whether the groove is pushed back, onto a sensor.
     """
 
     def __init__(
@@ -143,13 +144,18 @@ class ImpactContactForce(ContactStrategy):
         p_BoTo_B: np.ndarray,
         time_step: float,
         environment: Environment,
+        is_weighed: bool = False,
     ) -> None:
         super().__init__(plant, scene_graph, lock, surroundings)
         self._spring, self._M = spring, spring.mass_matrix()
         self._p_BoTo_B = p_BoTo_B
         exclude_collisions(scene_graph, lock.bolt_ids.values(), lock.groove_ids)
         self.system = ImpactContact(
-            lock.bolt.index(), R_WGn, time_step, self._conditions(environment)
+            lock.bolt.index(),
+            R_WGn,
+            time_step,
+            self._conditions(environment),
+            lock.groove.index() if is_weighed else None,
         )
 
     def add_forces(self, builder: DiagramBuilder, forces: OutputPort) -> OutputPort:

@@ -13,6 +13,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from drake_disasm.cell.arm_control import yielding
 from drake_disasm.cell.arm_description import refuse_unlimited_arm
 from drake_disasm.cell.arm_model import add_arm
+from drake_disasm.cell.arm_wrench import ArmWrench
 from drake_disasm.cell.coordinates import ArmCoordinates
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.ports import Health, check_ports
@@ -50,6 +51,8 @@ class HoldError(DisasmError):
 
 class HardwareStation(Station):
     """KUKA iiwa, OnRobot HEX and Robotiq 2F-140 behind their own protocols.
+
+    A scenario without a sensor takes the arm's own estimate of the wrench.
 
     Commands reach the devices through a CommandGate. `begin` connects the devices, and
     `close` disconnects them; a simulation before `begin` is refused. A dry run reads
@@ -112,7 +115,15 @@ class HardwareStation(Station):
         refuse_narrow_guard(scenario, config.safety)
         self.scenario, self.config, self.dry_run = scenario, config, dry_run
         self._set_arm()
-        self._cell = CellDevices(config, not dry_run, clock, wait, lcm)
+        has_sensor = scenario.ft_sensor.place != "none"
+        self._cell = CellDevices(
+            config,
+            not dry_run,
+            clock,
+            wait,
+            lcm,
+            None if has_sensor else self._estimated(scenario.arm),
+        )
         self.devices = self._cell.clients
         refuse_another_control(scenario, config)
         self._set_cell_geometry()
@@ -271,6 +282,22 @@ class HardwareStation(Station):
         for quantity in ("health", "time_measured"):
             builder.ExportOutput(reader.GetOutputPort(quantity), f"{name}.{quantity}")
 
+    def _estimated(
+        self, arm: ArmConfig
+    ) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """Returns what a sensor would read, by joint angles and external torques.
+
+        The arm's estimate leaves out what its tool data say; a sensor does not.
+        """
+        by_torques = ArmWrench(arm)
+
+        def reading(q: np.ndarray, external: np.ndarray) -> np.ndarray:
+            """Returns it (6,), [f; tau] at So in S."""
+            weight = self.payload.weight(by_torques.R_WF(q))
+            return np.asarray(by_torques.external(q, external) + weight)
+
+        return reading
+
     def _retreat(self) -> Retreat | None:
         limits = self.config.safety
         if limits.on_force == "hold":
@@ -307,6 +334,11 @@ def refuse_what_is_simulated(scenario: Scenario) -> None:
             f"randomisation.0 ({parameter}): hardware can't be drawn anew; take it out"
         )
     refuse_twins_contact(scenario)
+    if not scenario.gripper.fingers:
+        raise DisasmError(
+            "gripper.fingers: hardware drives two fingers; name them, or use `station` "
+            "cell"
+        )
 
 
 def _supervisor(

@@ -1,7 +1,5 @@
 """The cell's geometry posed by measurements, for a view of the real cell."""
 
-import dataclasses
-
 import numpy as np
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
@@ -45,14 +43,15 @@ class MeasuredCell(Diagram):
         plant = MultibodyPlant(0.0)
         source = plant.RegisterAsSourceForSceneGraph(graph)
         frame_Gn = add_nominal_groove(plant, nominal_groove_pose(scenario.placement))
-        gripped = dataclasses.replace(scenario.gripper, hold="weld")
-        held = dataclasses.replace(scenario, gripper=gripped)
-        joints = len(add_cell(plant, frame_Gn, held).arm.joints)
+        models = add_cell(plant, frame_Gn, scenario, is_welded=True)
+        joints, count = len(models.arm.joints), len(models.tool.fingers)
         plant.Finalize()
-        position = builder.AddNamedSystem("position", Multiplexer([joints, 2]))
+        sizes = [joints, count] if count else [joints]
+        position = builder.AddNamedSystem("position", Multiplexer(sizes))
         halves = np.array([[0.5, 0.0], [0.5, 0.0]])
         fingers = builder.AddNamedSystem("fingers", MatrixGain(D=halves))
-        builder.Connect(fingers.get_output_port(), position.get_input_port(1))
+        if count:
+            builder.Connect(fingers.get_output_port(), position.get_input_port(1))
         inputs = (position.get_input_port(0), fingers.get_input_port())
         for name, port in zip(measured_ports(scenario), inputs, strict=True):
             builder.ExportInput(port, name)

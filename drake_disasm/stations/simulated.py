@@ -2,21 +2,22 @@
 
 import copy
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, WeldJoint
+from pydrake.multibody.tree import Frame
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context, DiagramBuilder, System
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import RandomSource
 
 from drake_disasm.cell.lock import Lock
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.common.ports import check_ports
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor
+from drake_disasm.devices.load_source import LoadSource
 from drake_disasm.effects import (
     ArmEffect,
     BoltMotion,
@@ -61,9 +62,6 @@ class SimulatedStation(Station):
     #: Of the discrete plant [s].
     time_step: float
 
-    #: X_WS of (6,) coordinates, where the sensor is not on the joint that it reads.
-    _sensor_mount: Callable[[np.ndarray], RigidTransform] | None = None
-
     plant: MultibodyPlant
     scene_graph: SceneGraph
     lock: Lock
@@ -93,20 +91,21 @@ class SimulatedStation(Station):
         return add_nominal_groove(self.plant, self.X_WG)
 
     def _add_sensor(
-        self, builder: DiagramBuilder, joint: WeldJoint, frame_S: Frame
+        self,
+        builder: DiagramBuilder,
+        source: LoadSource,
+        inputs: Mapping[str, OutputPort],
     ) -> None:
+        """Adds the sensor of a source, whose ports read the inputs of their names."""
         config = self.scenario.ft_sensor
         self.sensor = ForceTorqueSensor(
             config,
-            joint.index(),
-            frame_S.body().index(),
-            frame_S.GetFixedPoseInBodyFrame(),
+            source,
             self.payload,
             self.time_step,
             sensor_chain(self.scenario.effects),
-            self._sensor_mount,
         )
-        self.sensor_noise = wire_sensor(builder, self.plant, self.sensor, config.period)
+        self.sensor_noise = wire_sensor(builder, self.sensor, inputs, config.period)
 
     def _finish(self, builder: DiagramBuilder) -> None:
         """Exports the simulation's own ports, builds, and settles."""
@@ -298,7 +297,7 @@ class SimulatedStation(Station):
 
     def _state_at_start(self, settled: Context) -> InitialState:
         load = self.sensor.load(self.part_context(self.sensor, settled))
-        on_bolt = load - self.mounting.weight(self.mounting.X_BS.rotation())
+        on_bolt = load - self.mounting.weight_at_start
         force = float(np.linalg.norm(on_bolt[:3]))
         return InitialState(self.start, self.reading_at_zeroing(settled), force)
 

@@ -12,11 +12,11 @@ from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Pass
 
 from drake_disasm.cell.coordinates import BoltCoordinates
 from drake_disasm.cell.grip import deflection
-from drake_disasm.cell.lock import add_lock
 from drake_disasm.cell.tool import summed
 from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.ports import TWIN_PORTS
+from drake_disasm.devices.load_source import JointReaction
 from drake_disasm.effects import ArmEffect
 from drake_disasm.effects.refusals import refuse_arm_effects
 from drake_disasm.parts import ImpactConfig
@@ -27,10 +27,15 @@ from drake_disasm.scenario import (
     validate,
 )
 from drake_disasm.stations.arm_node import ArmNode
+from drake_disasm.stations.cell_models import add_weighed_lock
 from drake_disasm.stations.contact import ContactStrategy, ImpactContactForce
 from drake_disasm.stations.simulated import SimulatedStation
 from drake_disasm.stations.six_axis_spring import SixAxisSpring
-from drake_disasm.stations.wiring import export_ready_device, export_required
+from drake_disasm.stations.wiring import (
+    export_ready_device,
+    export_required,
+    reaction_ports,
+)
 from drake_disasm.systems.bolt_environment import BoltEnvironment
 from drake_disasm.systems.optional_input import OptionalInput
 from drake_disasm.twin.arm_step import ArmStep
@@ -54,8 +59,9 @@ class TwinStation(SimulatedStation):
     Behind it is the gripper's six-axis spring, of joints along x, y, z and about z, x,
     y from Gn in the middle of the pads, which the solver takes implicitly: what it
     gives by, no encoder sees. Bolt and fingers hang on it by a weld at S whose
-    reaction is the sensor's load, so the readings mean the same as the cell's and
-    pass the same processing. While `bolt.velocity` is not connected it is zero.
+    reaction is the load on a sensor in the wrist, and what is estimated without one, so
+    the readings mean the same as the cell's and pass the same processing. While
+    `bolt.velocity` is not connected it is zero.
 
     @system
     name: TwinStation
@@ -137,7 +143,7 @@ class TwinStation(SimulatedStation):
             wrench: (6,) on the bolt at Bo in Gn, [f; tau], processed as the task's.
         """
         parameters = self.parameters
-        weight = self.X_WG.rotation().inverse() @ (self.payload_mass * self.g_W)
+        weight = self.X_WG.rotation().inverse() @ (self._moved_mass * self.g_W)
         found = deflection(parameters.grip, parameters.p_BoTo_B, weight, wrench)
         return np.asarray(found)
 
@@ -163,22 +169,25 @@ class TwinStation(SimulatedStation):
         scenario = self.scenario
         frame_Gn = self._add_plant(builder, scenario.simulation.twin_time_step)
         plant = self.plant
-        part, contact = scenario.part, scenario.contact
-        self.lock = add_lock(plant, frame_Gn, part, contact, self._environment)
+        under, self.lock = add_weighed_lock(
+            plant, frame_Gn, scenario, self._environment
+        )
         p_BoTo_B, springs = self.parameters.p_BoTo_B, self._arm_step().springs
         frame_Tn = plant.AddFrame(
             FixedOffsetFrame("grip_nominal", frame_Gn, RigidTransform(p_BoTo_B))
         )
         self._spring = SixAxisSpring(plant, "grip", frame_Tn, springs)
-        frame_S, joint = self._add_sensor_joint()
+        source = JointReaction(*self._add_sensor_joint(), self._sensor_mount)
+        if under:
+            source = JointReaction(under.joint, under.frame_S)
         plant.Finalize()
         self._read_payload()
         self._wire_commands(builder)
-        self._add_sensor(builder, joint, frame_S)
-        builder.Connect(
-            builder.GetSubsystemByName("measured").get_output_port(0),
-            self.sensor.GetInputPort("mount_coordinates"),
-        )
+        inputs = reaction_ports(plant)
+        if not under:
+            measured = builder.GetSubsystemByName("measured").get_output_port(0)
+            inputs |= {"mount_coordinates": measured}
+        self._add_sensor(builder, source, inputs)
         export_ready_device(builder, "bolt", self.time_step)
         self._finish(builder)
 
@@ -195,13 +204,14 @@ class TwinStation(SimulatedStation):
             p_BoTo_B=self.parameters.p_BoTo_B,
             time_step=self.time_step,
             environment=self._environment,
+            is_weighed=self.X_GS is not None,
         )
 
     def _refuse_arm_effects(self, effects: Sequence[ArmEffect]) -> None:
         refuse_arm_effects(effects)
 
-    def _add_sensor_joint(self) -> tuple[Frame, WeldJoint]:
-        """Hangs bolt and fingers on the springs; returns S and the weld there."""
+    def _add_sensor_joint(self) -> tuple[WeldJoint, Frame]:
+        """Hangs bolt and fingers on the springs; returns the weld there, and S."""
         plant, bolt = self.plant, self.lock.bolt
         X_TB = RigidTransform(self.parameters.p_BoTo_B).inverse()
         X_BS = self.X_SB.inverse()
@@ -215,14 +225,14 @@ class TwinStation(SimulatedStation):
             "fingers", self._spring.instance, self.parameters.M_fingers_B
         )
         plant.WeldFrames(bolt.body_frame(), fingers.body_frame())
-        return frame_S, plant.WeldFrames(on_spring, frame_S)
+        return plant.WeldFrames(on_spring, frame_S), frame_S
 
     def _read_payload(self) -> None:
-        """Sets what the sensor carries: bolt and fingers."""
+        """Sets what the sensor carries: bolt and fingers, if it is in the wrist."""
         bolt = self.lock.bolt.default_spatial_inertia()
         M_B = summed([bolt, self.parameters.M_fingers_B])
-        self.payload_mass = M_B.get_mass()
-        self.p_SoScm_S = self.X_SB @ M_B.get_com()
+        self._moved_mass = M_B.get_mass()
+        self._set_payload(self._moved_mass, self.X_SB @ M_B.get_com())
 
     def _sensor_mount(self, coordinates: np.ndarray) -> RigidTransform:
         """Returns X_WS of a sensor before the springs, by the arm's coordinates."""

@@ -1,5 +1,7 @@
 """Parts that simulated stations have in common, added to their diagrams."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.geometry import SceneGraph
@@ -9,7 +11,7 @@ from pydrake.multibody.plant import (
     MultibodyPlant,
     MultibodyPlantConfig,
 )
-from pydrake.systems.framework import DiagramBuilder, InputPort
+from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
 from drake_disasm.cell.lock import Lock
@@ -60,33 +62,38 @@ def export_required(
 
 def wire_sensor(
     builder: DiagramBuilder,
-    plant: MultibodyPlant,
     sensor: ForceTorqueSensor,
+    inputs: Mapping[str, OutputPort],
     period: float,
 ) -> RandomSource:
-    """Connects a force/torque sensor to its plant, and exports what it reads.
+    """Connects a force/torque sensor to its source, and exports what it reads.
 
     Args:
         builder: of the station.
-        plant: whose reaction is read.
         sensor: not yet in the diagram.
+        inputs: what its source's ports read, by their names.
         period: of its noise [s].
 
     Returns:
         The source of its noise.
     """
-    connect = builder.Connect
     builder.AddNamedSystem("ft_sensor", sensor)
     noise = builder.AddNamedSystem(
         "ft_sensor_noise", RandomSource(RandomDistribution.kGaussian, 6, period)
     )
-    reactions = plant.get_reaction_forces_output_port()
-    connect(reactions, sensor.GetInputPort("reaction_forces"))
-    connect(plant.get_body_poses_output_port(), sensor.GetInputPort("body_poses"))
-    connect(noise.get_output_port(), sensor.GetInputPort("noise"))
+    for name, port in {**inputs, "noise": noise.get_output_port()}.items():
+        builder.Connect(port, sensor.GetInputPort(name))
     for quantity in ("wrench", "health", "time_measured"):
         builder.ExportOutput(sensor.GetOutputPort(quantity), f"ft_sensor.{quantity}")
     return noise
+
+
+def reaction_ports(plant: MultibodyPlant) -> dict[str, OutputPort]:
+    """Returns what a `JointReaction` reads of its plant, by the names of its ports."""
+    return {
+        "reaction_forces": plant.get_reaction_forces_output_port(),
+        "body_poses": plant.get_body_poses_output_port(),
+    }
 
 
 def export_ready_device(builder: DiagramBuilder, name: str, time_step: float) -> None:

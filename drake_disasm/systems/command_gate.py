@@ -15,6 +15,7 @@ from pydrake.systems.framework import (
 
 from drake_disasm.cell.coordinates import Coordinates
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.rotations import Pose
 from drake_disasm.common.stopwatch import Stopwatch
 from drake_disasm.common.timing import GRIPPER_DELAY
 from drake_disasm.devices.reading import Clock, Reading
@@ -129,8 +130,7 @@ class CommandGate(LeafSystem):
         Args:
             reading: (6,) of the sensor, taken there.
         """
-        weight = self._mounting.weight(self._mounting.X_BS.rotation())
-        self._offset = reading - weight
+        self._offset = reading - self._mounting.weight_at_start
         self._before = np.full_like(self._before, np.nan)
         self.pace.begin()
         self.lag.begin()
@@ -199,11 +199,12 @@ class CommandGate(LeafSystem):
         )
 
     def _load(self, reading: np.ndarray, X_GB: RigidTransform) -> np.ndarray | None:
-        """Returns the load (6,) on the bolt at Bo in S's axes, or None: not zeroed."""
+        """Returns the load (6,) on the bolt at Bo, or None: not zeroed.
+
+        In the axes of S, or of the flange if the sensor is elsewhere.
+        """
         if self._offset is None:
             return None
-        wrench_G = contact_wrench(
-            reading, self._offset, X_GB.rotation(), self._mounting
-        )
+        wrench_G = contact_wrench(reading, self._offset, Pose.of(X_GB), self._mounting)
         R_SG = self._mounting.X_SB.rotation() @ X_GB.rotation().inverse()
         return np.concatenate([R_SG @ wrench_G[:3], R_SG @ wrench_G[3:]])

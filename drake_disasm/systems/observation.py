@@ -43,6 +43,8 @@ class Mounting:
         R_WG: the groove's nominal frame in the world.
         mass, p_SoScm_S: payload of the sensor [kg], (3,) [m].
         g_W: gravity (3,) [m/s^2].
+        X_GS: the sensor where it stands under the fixed part; None: it moves with the
+            bolt.
 
     Of n sensors poses and rotations are arrays, mass is (n, 1), vectors are (n, 3).
     """
@@ -52,12 +54,32 @@ class Mounting:
     mass: float | Array
     p_SoScm_S: Array
     g_W: Array
+    X_GS: RigidTransform | Pose | None = None
 
     @functools.cached_property
     def X_BS(self) -> Pose:
         """The sensor in the bolt's frame."""
         X_SB = self.X_SB if isinstance(self.X_SB, Pose) else Pose.of(self.X_SB)
         return X_SB.inverse()
+
+    def from_bolt(self, X_GB: Pose) -> Pose:
+        """Returns the sensor's axes, and where it is from Bo: R_GS and p_BoSo_G."""
+        if self.X_GS is None:
+            X_BS, R = self.X_BS, X_GB.R
+            return Pose(namespace(R).matmul(R, X_BS.R), apply_matrix(R, X_BS.p))
+        X_GS = self.X_GS if isinstance(self.X_GS, Pose) else Pose.of(self.X_GS)
+        return Pose(X_GS.R, X_GS.p - X_GB.p)
+
+    @property
+    def weight_at_start(self) -> Array:
+        """The payload's load on the sensor (..., 6) as an episode begins, in S."""
+        standing = self.X_BS if self.X_GS is None else self.X_GS
+        return self.weight(standing.rotation())
+
+    @property
+    def sign(self) -> float:
+        """Of the wrench on the bolt by the load: -1 where the fixed part has it."""
+        return 1.0 if self.X_GS is None else -1.0
 
     def R_WS(self, R_GS: Array) -> Array:
         """Returns the sensor's orientation in the world (..., 3, 3)."""
@@ -70,7 +92,7 @@ class Mounting:
 
 
 def contact_wrench(
-    reading: Array, offset: Array, R_GB: RotationMatrix | Array, mounting: Mounting
+    reading: Array, offset: Array, X_GB: Pose, mounting: Mounting
 ) -> Array:
     """Returns the environment's wrench on the bolt at Bo in G, exactly.
 
@@ -81,17 +103,16 @@ def contact_wrench(
     Args:
         reading: (..., 6) raw [f; tau] at So in S.
         offset: (..., 6) the reading at zeroing less the payload's weight.
-        R_GB: measured orientation of the bolt, (..., 3, 3) or Drake's.
+        X_GB: measured pose of the bolt.
         mounting: geometry and payload.
     """
-    X_BS, R = mounting.X_BS, as_matrices(R_GB)
-    R_GS = namespace(R).matmul(R, X_BS.R)
-    load = reading - offset - mounting.weight(R_GS)
-    return shifted_wrench(load, R_GS, apply_matrix(R, X_BS.p))
+    there = mounting.from_bolt(X_GB)
+    load = reading - offset - mounting.weight(there.R)
+    return shifted_wrench(mounting.sign * load, there.R, there.p)
 
 
 def small_angle_contact_wrench(
-    reading: Array, tare: Array, R_GB: RotationMatrix | Array, mounting: Mounting
+    reading: Array, tare: Array, X_GB: Pose, mounting: Mounting
 ) -> Array:
     """Returns the same by the thesis's equations 4.4, 4.6 and 4.7.
 
@@ -102,13 +123,13 @@ def small_angle_contact_wrench(
     what eq. 4.7's own geometry (p x f on the y axis) gives, where 4.6 prints +.
 
     Args:
-        reading, R_GB, mounting: as in `contact_wrench`.
+        reading, X_GB, mounting: as in `contact_wrench`.
         tare: (..., 6) the reading at zeroing.
     """
     xp, X_BS = namespace(reading), mounting.X_BS
     change = reading - tare
     f, t = (apply_matrix(X_BS.R, part) for part in (change[..., :3], change[..., 3:]))
-    rpy = rpy_of_matrices(as_matrices(R_GB))
+    rpy = rpy_of_matrices(X_GB.R)
     alpha, gamma = rpy[..., 0:1], rpy[..., 2:3]
     G = mounting.mass * _length(mounting.g_W)
     l1, l2 = _length(mounting.p_SoScm_S), _length(X_BS.p)
@@ -141,7 +162,7 @@ class StateFromReadings:
         """Returns what zeroing takes off, of readings (..., 6) with X_GB = identity."""
         if not self.is_exact:
             return reading
-        return reading - self.mounting.weight(self.mounting.X_BS.rotation())
+        return reading - self.mounting.weight_at_start
 
     def state(self, X_GB: Pose, reading: Array, offset: Array) -> Array:
         """Returns states s (..., 12) of measured poses and raw readings (..., 6).
@@ -151,14 +172,14 @@ class StateFromReadings:
             reading: [f; tau] at So in S.
             offset: (..., 6) from `offset`.
         """
-        wrench = self.wrench(X_GB.R, reading, offset)
+        wrench = self.wrench(X_GB, reading, offset)
         to_vector = rotation_vectors if self.is_exact else rpy_of_matrices
         return namespace(wrench).concat([X_GB.p, to_vector(X_GB.R), wrench], axis=-1)
 
-    def wrench(self, R_GB: Array, reading: Array, offset: Array) -> Array:
+    def wrench(self, X_GB: Pose, reading: Array, offset: Array) -> Array:
         """Returns the wrench (..., 6) of readings; see `state`."""
         process = contact_wrench if self.is_exact else small_angle_contact_wrench
-        return process(reading, offset, R_GB, self.mounting)
+        return process(reading, offset, X_GB, self.mounting)
 
 
 class ObservationProcessor(LeafSystem):

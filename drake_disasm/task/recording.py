@@ -23,6 +23,13 @@ _NO_STEP: dict[str, Any] = {
     "action_executed": np.zeros(6),
 } | {f"reward.{name}": np.float64(0.0) for name in REWARD_TERMS}
 
+#: By the scenario's `ft_sensor.place`.
+_WRENCH_FROM = {
+    "wrist": "a sensor in the wrist",
+    "part": "a sensor under the fixed part",
+    "none": "an estimate without a sensor",
+}
+
 
 class EpisodeRecorder:
     """Collects an episode's rows in the layout of a `transitions` log.
@@ -107,9 +114,14 @@ def transitions_header(
     Args:
         scenario: that the log states.
         station: "cell" or "hardware", which have joints, or "twin".
-        provenance: where the log is from; the station is added.
+        provenance: where the log is from; the station is added, and what the wrench is
+            from.
     """
-    simulated = {"simulated": station != "hardware", "station": station}
+    simulated = {
+        "simulated": station != "hardware",
+        "station": station,
+        "wrench_from": _WRENCH_FROM[scenario.ft_sensor.place],
+    }
     return LogHeader(
         kind="transitions",
         task=scenario.name,

@@ -1,5 +1,6 @@
 """IMPACT contact in the twin's diagram, implicit as the plant's own is."""
 
+import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RotationMatrix
 from pydrake.multibody.math import SpatialForce
@@ -7,6 +8,8 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context, LeafSystem
 
+from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.common.spatial import shifted_wrench
 from drake_disasm.twin.conditions import ImpactConditions
 from drake_disasm.twin.contact_step import NO_BALANCE, ImpactStep
 
@@ -35,6 +38,7 @@ class ImpactContact(LeafSystem):
         R_WGn: nominal groove frame in the world.
         time_step: of the plant, h [s].
         conditions: of the default Context.
+        groove: the body that is pushed back, if anything weighs it.
     """
 
     def __init__(
@@ -43,9 +47,11 @@ class ImpactContact(LeafSystem):
         R_WGn: RotationMatrix,
         time_step: float,
         conditions: ImpactConditions,
+        groove: BodyIndex | None = None,
     ) -> None:
         super().__init__()
         self._bolt, self._R_WGn, self._h = bolt, R_WGn.matrix(), time_step
+        self._groove = groove
         self._conditions = self.DeclareAbstractParameter(Value[object](conditions))
         self._state = self.DeclareVectorInputPort("state", 12)
         self._desired = self.DeclareVectorInputPort("desired_state", 12)
@@ -82,9 +88,26 @@ class ImpactContact(LeafSystem):
         )
         if not step.is_solved[0]:
             raise RuntimeError(NO_BALANCE)
-        f, t = step.wrench[0, :3], step.wrench[0, 3:]
-        force = ExternallyAppliedSpatialForce()
-        force.body_index = self._bolt
-        force.F_Bq_W = SpatialForce(tau=self._R_WGn @ t, f=self._R_WGn @ f)
+        forces = [self._force(self._bolt, step.wrench[0])]
+        if self._groove is not None:
+            p_GoBo = self._p_GoBo(context, state[:6])
+            back = -shifted_wrench(step.wrench[0], np.eye(3), p_GoBo)
+            forces.append(self._force(self._groove, back))
         has_more = self._outside.HasValue(context)
-        output.set_value([force, *(self._outside.Eval(context) if has_more else [])])
+        output.set_value([*forces, *(self._outside.Eval(context) if has_more else [])])
+
+    def _force(
+        self, body: BodyIndex, wrench: np.ndarray
+    ) -> ExternallyAppliedSpatialForce:
+        """Returns a wrench (6,), [f; tau] in Gn, at a body's origin."""
+        force = ExternallyAppliedSpatialForce()
+        force.body_index = body
+        f, t = wrench[:3], wrench[3:]
+        force.F_Bq_W = SpatialForce(tau=self._R_WGn @ t, f=self._R_WGn @ f)
+        return force
+
+    def _p_GoBo(self, context: Context, q: np.ndarray) -> np.ndarray:
+        """Returns where the bolt is from the groove (3,), in Gn."""
+        conditions = self.conditions(context)
+        X_GnB = BoltCoordinates(conditions.p_BoTo_B).pose(q)
+        return np.asarray(X_GnB.translation() - conditions.around.p_GnG[0])

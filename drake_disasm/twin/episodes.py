@@ -16,6 +16,7 @@ from drake_disasm.effects import BoltMotion, MotionEffect
 from drake_disasm.scenario import Scenario, with_values
 from drake_disasm.twin.numbers import TwinNumbers
 from drake_disasm.twin.plant import Plant, PlantState
+from drake_disasm.twin.refusals import refuse_sensor_elsewhere
 from drake_disasm.twin.scalar_effects import refuse_scalar_effects
 from drake_disasm.twin.slots import EffectSlots
 from drake_disasm.twin.stacking import leaves_of, shared, with_leaves
@@ -75,7 +76,8 @@ class TwinBatch:
         threads: of the host, which share the environments.
 
     Raises:
-        DisasmError: the equation of a user's own effect takes no arrays.
+        DisasmError: the equation of a user's own effect takes no arrays, or the sensor
+            is not in the wrist.
     """
 
     def __init__(
@@ -84,6 +86,7 @@ class TwinBatch:
         self.like, self.slots, self._threads = like, EffectSlots(scenarios), threads
         refuse_scalar_effects(self.slots.slots, like)
         first = scenarios[0]
+        refuse_sensor_elsewhere(first)
         self.period = first.task.period
         self.h = first.simulation.twin_time_step
         self._per_sample = max(1, round(first.ft_sensor.period / self.h))

@@ -97,6 +97,7 @@ def refuse_scenarios(scenarios: Sequence[Scenario]) -> None:
     """
     for scenario in {repr(s): s for s in scenarios}.values():
         validate(scenario)
+        refuse_sensor_elsewhere(scenario)
         _refuse_contact(scenario)
         refuse_unknown_kinds(scenario.effects)
         refuse_arm_effects([e for e in scenario.effects if isinstance(e, ArmEffect)])
@@ -106,6 +107,20 @@ def refuse_scenarios(scenarios: Sequence[Scenario]) -> None:
         _refuse_sampling(scenario)
         for end in ("low", "high"):
             _refuse_others(corner(scenario, end), corner(scenarios[0], "low"))
+
+
+def refuse_sensor_elsewhere(scenario: Scenario) -> None:
+    """Refuses a sensor that is not in the wrist.
+
+    Raises:
+        DisasmError: says what to use instead.
+    """
+    place = scenario.ft_sensor.place
+    if place != "wrist":
+        raise DisasmError(
+            f"ft_sensor.place: '{place}' has no form for a batch; set it to wrist, or "
+            "use the diagram's twin with contact.model hydroelastic"
+        )
 
 
 def _refuse_others(scenario: Scenario, first: Scenario) -> None:

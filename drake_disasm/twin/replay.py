@@ -118,5 +118,5 @@ def _observed(
     X_GB = twins.numbers.coordinates.poses(arm[:, :6])
     load, sensing = twins.load_S(arm, step), twins.sensing(arm, time)
     reading = sensed(load, twins.effects.sensor, sensing)
-    wrench = twins.processing.wrench(X_GB.R, reading, offset)
+    wrench = twins.processing.wrench(X_GB, reading, offset)
     return np.hstack([X_GB.p, rotation_vectors(X_GB.R), wrench])

@@ -78,7 +78,7 @@ class GripState:
         gripper, twin = scenario.gripper, twin_of(scenario)
         carried = Tool.from_models(scenario).M_gripped_B
         creeps = station == "cell" and gripper.hold == "friction"
-        creeps &= gripper.compliance == "adaptive"
+        creeps &= bool(gripper.fingers) and gripper.compliance == "adaptive"
         S = velocity_shift(_PATCH - twin.p_BoTo_B)
         R_GW = nominal_groove_pose(scenario.placement).rotation().inverse()
         f = R_GW @ (carried.get_mass() * UniformGravityFieldElement().gravity_vector())

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from drake_disasm.cell.placement import nominal_groove_pose
 from drake_disasm.cell.tool import Tool
+from drake_disasm.common.errors import DisasmError
 from drake_disasm.devices.sensor_chain import (
     Payload,
     sensed_along,
@@ -58,6 +59,19 @@ def at_bolt(states: Array, X_SB: RigidTransform) -> Array:
     return np.hstack([states[:, :6], f_G, t_Bo_G])
 
 
+def refuse_sensor_under_part(scenario: Scenario) -> None:
+    """Refuses a scenario whose sensor does not move with the bolt.
+
+    Raises:
+        DisasmError: says which places are identified.
+    """
+    if scenario.ft_sensor.place == "part":
+        raise DisasmError(
+            "ft_sensor.place: 'part' can't be identified or checked; record with the "
+            "sensor in the wrist, or with none"
+        )
+
+
 class SensorReading:
     """How the sensor's effects change processed wrenches, many at once.
 
@@ -78,7 +92,11 @@ class SensorReading:
             scenario: of the log.
             tool: on the flange.
             station: where the log was recorded: "cell", "hardware", or the twin.
+
+        Raises:
+            DisasmError: the sensor does not move with the bolt.
         """
+        refuse_sensor_under_part(scenario)
         self.X_SB = tool.X_SB
         self._R_WG = nominal_groove_pose(scenario.placement).rotation().matrix()
         self._R_BS = tool.X_SB.inverse().rotation().matrix()

@@ -29,6 +29,7 @@ from sysid.models.bookkeeping import Bookkeeping, Frame, Poses
 from sysid.models.channel_grams import likely
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.scenario_model import ScenarioModel
+from sysid.models.sensor_reading import refuse_sensor_under_part
 from sysid.models.wrench_bookkeeping import Readings, better_ways, has_no_weight
 from sysid.parameters import Parameter
 
@@ -261,6 +262,7 @@ def _rotated(R: Array, wrench: Array) -> Array:
 
 
 def _payload(scenario: Scenario) -> Payload:
+    refuse_sensor_under_part(scenario)
     tool = Tool.from_models(scenario)
     return Payload(tool.mass, tool.p_SoScm_S, _GRAVITY_W)
 

@@ -1,5 +1,6 @@
 """Whether the arm's driver still sends, which Drake's receiver does not say."""
 
+import dataclasses
 import time
 
 import numpy as np
@@ -64,7 +65,7 @@ class IiwaStatusMonitor:
         period: float,
         clock: Clock = time.monotonic,
     ) -> None:
-        self._mailbox, self._period = Mailbox(JOINTS, clock), period
+        self._mailbox, self._period = Mailbox(2 * JOINTS, clock), period
         self._device_clock = DeviceClock()
         self._stamp: float | None = None  # of the newest, by the driver's clock [s]
         self._came = self._since = -np.inf  # newest, and first without a break [s]
@@ -74,6 +75,11 @@ class IiwaStatusMonitor:
 
     def read(self) -> Reading:
         """Returns the newest measured joint angles (7,) [rad]."""
+        newest = self._mailbox.read()
+        return dataclasses.replace(newest, values=newest.values[:JOINTS])
+
+    def read_with_external(self) -> Reading:
+        """Returns the newest joint angles and external torques (14,) [rad, N m]."""
         return self._mailbox.read()
 
     def sending_for(self, now: float) -> float:
@@ -92,7 +98,8 @@ class IiwaStatusMonitor:
             return
         taken = self._device_clock.taken_at(stamp, now)
         self.commanded = np.array(message.joint_position_commanded)
-        self._mailbox.put(np.array(message.joint_position_measured), taken)
+        values = [*message.joint_position_measured, *message.joint_torque_external]
+        self._mailbox.put(np.array(values), taken)
         self._checked.Publish(self._channel, data)
 
     def _is_newer(self, stamp: float, now: float) -> bool:

@@ -5,11 +5,18 @@ from pydrake.common import RandomGenerator
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialForce
-from pydrake.multibody.tree import BodyIndex, JointIndex
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    Frame,
+    SpatialInertia,
+    WeldJoint,
+)
 from pydrake.systems.framework import Context
 
 from drake_disasm.common.ports import Health
 from drake_disasm.devices.ft_sensor import ForceTorqueSensor, quantise
+from drake_disasm.devices.load_source import JointReaction
 from drake_disasm.devices.sensor_chain import Payload
 from drake_disasm.effects import PayloadError, Sensing, SensorBias, SensorEffect
 from drake_disasm.scenario import SensorConfig, load_scenario
@@ -19,18 +26,29 @@ G_W = np.array([0.0, 0.0, -9.81])
 LOAD = np.array([1.0, -2.0, 3.0, 0.1, -0.2, 0.3])  # [f; tau] on the sensor, in S
 R_BODY_S = RollPitchYaw(0.1, 0.2, 0.3).ToRotationMatrix()
 R_W_BODY = RollPitchYaw(-0.5, 0.4, 1.0).ToRotationMatrix()
-JOINT, BODY = 2, 1
+
+
+def _weld() -> tuple[WeldJoint, Frame]:
+    """The third joint's weld, joint 0 being removed, and S, on body 1."""
+    plant, X_BodyS = MultibodyPlant(0.0), RigidTransform(R_BODY_S, [1, 2, 3])
+    one, other, last = (plant.AddRigidBody(n, SpatialInertia.Zero()) for n in "abc")
+    world = plant.world_frame()
+    removed = plant.WeldFrames(world, last.body_frame())
+    plant.RemoveJoint(removed)
+    plant.WeldFrames(world, other.body_frame())
+    plant.WeldFrames(world, last.body_frame())
+    frame_S = plant.AddFrame(FixedOffsetFrame("S", one.body_frame(), X_BodyS))
+    return plant.WeldFrames(world, frame_S), frame_S
 
 
 def _sensor(
     noise: float = 0.0, quantum: float = 0.0, load: np.ndarray = LOAD
 ) -> tuple[ForceTorqueSensor, Context]:
-    """A sensor at joint 2 and body 1, whose reaction is minus the load."""
+    """A sensor at a weld, whose reaction is minus the load."""
     config = SensorConfig(noise=[noise] * 6, quantum=[quantum] * 6)
-    X_BodyS = RigidTransform(R_BODY_S, [1, 2, 3])
-    joint, body = JointIndex(JOINT), BodyIndex(BODY)
+    source = JointReaction(*_weld())
     sensor = ForceTorqueSensor(
-        config, joint, body, X_BodyS, Payload(0.0, np.zeros(3), G_W), time_step=0.25
+        config, source, Payload(0.0, np.zeros(3), G_W), time_step=0.25
     )
     context = sensor.CreateDefaultContext()
     other = SpatialForce(tau=[9, 9, 9], f=[9, 9, 9])

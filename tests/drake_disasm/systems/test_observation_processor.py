@@ -5,6 +5,7 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.common.rotations import Pose
 from drake_disasm.common.spatial import (
     pose_to_vector,
     rotation_vector,
@@ -82,7 +83,8 @@ def _error(alpha: float, gamma: float, wrench: np.ndarray | None = None) -> np.n
     X_GS = RigidTransform(R_GB) @ UPRIGHT.X_SB.inverse()
     contact_S = shift_and_express(wrench, X_GS.inverse())
     tare, reading = _weight(UPRIGHT, RotationMatrix()), _weight(UPRIGHT, R_GB)
-    return small_angle_contact_wrench(reading + contact_S, tare, R_GB, UPRIGHT) - wrench
+    X_GB = Pose.of(RigidTransform(R_GB))
+    return small_angle_contact_wrench(reading + contact_S, tare, X_GB, UPRIGHT) - wrench
 
 
 def test_small_angle_form_does_not_turn_the_wrench_back() -> None:
