@@ -2,20 +2,26 @@
 
     python benchmarks/parts.py play
     python benchmarks/parts.py jamming
+    python benchmarks/parts.py learning out/peg.json out/bayonet.json
 
 play: how far a peg moves across its hole under 1 N. jamming: how far a peg comes in
 0.2 s that is pulled beside its axis, against Whitney's jamming diagram ("Quasi-static
 assembly of compliantly supported rigid parts", 1982): without a side force it slides
 while M / F < l / (2 mu), for two contacts that are l apart. detent: the torque that a
 bayonet's sensor reads against its spring's. time_steps: peaks of the baseline's
-episodes at half the time step. speed: times real time.
+episodes at half the time step. contact: its episodes with hydroelastic contact and with
+IMPACT. speed: times real time. learning: policies as `drake-disasm evaluate --json` has
+found them, the seeds of a training together.
 """
 
 import argparse
 import dataclasses
 import itertools
+import json
 import time
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydrake.multibody.math import SpatialForce
@@ -27,6 +33,7 @@ from results import Cell, add_results_argument, markdown, write_result
 from drake_disasm.cell.lock import add_lock
 from drake_disasm.common.program import argument_parser, run
 from drake_disasm.common.spatial import rotation_vector
+from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.parts import ContactConfig, Part, PegInHole
 from drake_disasm.policies import make_policy
 from drake_disasm.scenario import SimulationConfig, load_scenario
@@ -37,6 +44,11 @@ from drake_disasm.task.simulation import TaskSimulation
 _NAME = "benchmarks/parts.py"
 QUIET = "ft_sensor.noise=[0, 0, 0, 0, 0, 0]"
 _SCENARIOS = ("removal", "iiwa_peg", "iiwa_bayonet")
+_LEARNING = "Policies of all seeds of a training, evaluated without exploration"
+_LEARNING_COLUMNS = (
+    *("scenario", "station", "policy", "seeds that always succeed"),
+    *("episodes that succeed", "P (median of seeds)", "mean peak F [N]"),
+)
 
 Rows = list[tuple[Cell, ...]]
 
@@ -157,6 +169,37 @@ def _time_step_rows() -> Iterator[tuple[Cell, ...]]:
             yield scenario, station, 1e3 * h, *rounded
 
 
+def _contact_rows() -> Iterator[tuple[Cell, ...]]:
+    for scenario, contact in itertools.product(_SCENARIOS, ("hydroelastic", "impact")):
+        found = _episode(scenario, "twin", f"contact.model={contact}")
+        names = ("steps", "mean_force", "max_force", "max_torque")
+        yield scenario, contact, *(round(float(found[name]), 3) for name in names)
+
+
+def learning_rows(files: Sequence[Path]) -> Iterator[tuple[Cell, ...]]:
+    """Yields what evaluations say of each training, and of each other policy.
+
+    Args:
+        files: that `drake-disasm evaluate --json` has written.
+    """
+    rows = [row for file in files for row in json.loads(file.read_text())["rows"]]
+    groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    for row in rows:
+        path = Path(row["policy"])
+        name = path.parent.name if path.parent.name else path.name
+        groups.setdefault((row["scenario"], row["station"], name), []).append(row)
+    for key, own in groups.items():
+        right, count = (sum(r[name] for r in own) for name in ("successes", "episodes"))
+        low, high = (f"{100 * end:.0f}" for end in wilson_interval(right, count))
+        whole = sum(r["successes"] == r["episodes"] for r in own)
+        performance, peak = (
+            round(float(np.median([r[name] for r in own])), 2)
+            for name in ("performance", "mean_peak_force")
+        )
+        of_all = f"{right} of {count} ({low} to {high} %)"
+        yield *key, f"{whole} of {len(own)}", of_all, performance, peak
+
+
 def _speed_rows() -> Iterator[tuple[Cell, ...]]:
     for station in ("twin", "cell"):
         rates = {name: _episode(name, station)["rate"] for name in _SCENARIOS}
@@ -195,6 +238,11 @@ TABLES = {
         ("scenario", "station", "step [ms]", "max F [N]", "max T [N m]", "steps"),
         _time_step_rows,
     ),
+    "contact": _Table(
+        "Admittance on the twin with either contact, without noise",
+        ("scenario", "contact", "steps", "mean F [N]", "max F [N]", "max T [N m]"),
+        _contact_rows,
+    ),
     "speed": _Table(
         "Real-time factor of an episode, and as a share of the door chain's",
         ("scenario", "station", "times real time", "share"),
@@ -206,7 +254,10 @@ TABLES = {
 def main(arguments: Sequence[str]) -> int:
     """Prints a table; returns the exit status."""
     args = parse(arguments)
-    table = TABLES[args.table]
+    if args.table == "learning":
+        table = _Table(_LEARNING, _LEARNING_COLUMNS, lambda: learning_rows(args.files))
+    else:
+        table = TABLES[args.table]
     rows: Rows = list(table.rows())
     print(markdown(table.columns, rows))
     write_result(args.results, table.title, table.columns, rows, _NAME, arguments)
@@ -216,7 +267,11 @@ def main(arguments: Sequence[str]) -> int:
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
     parser = argument_parser(f"python {_NAME}", __doc__, "")
-    parser.add_argument("table", choices=TABLES, help=f"one of {', '.join(TABLES)}")
+    names = (*TABLES, "learning")
+    parser.add_argument("table", choices=names, help=f"one of {', '.join(names)}")
+    parser.add_argument(
+        "files", nargs="*", type=Path, help="with learning: evaluations"
+    )
     add_results_argument(parser)
     return parser.parse_args(arguments)
 

@@ -1071,8 +1071,8 @@ def _lug_under_plate(k: int, sign: float, corner: int, w: np.ndarray) -> None:
     _point(k, sign * reach, top, half * (1.0 - 2.0 * (corner % 2)), w)
     _face(k, 0.0, -1.0, 0.0, w)
     depth = w[P_GBO + 1] + w[ARM + 3 * k + 1] + plate
-    beside = abs(_across_notch(k, w)) - half_notch
-    is_in_notch = abs(_along_notch(k, w)) < notch_end and beside < max(0.0, depth)
+    excess = abs(_across_notch(k, w)) - half_notch
+    is_in_notch = abs(_along_notch(k, w)) < notch_end and excess < max(0.0, depth)
     w[DEPTH + k] = -1.0 if is_in_notch or depth > plate / 2.0 else depth
 
 

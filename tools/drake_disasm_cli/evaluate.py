@@ -172,7 +172,12 @@ def _name(row: Row) -> str:
 
 def _write_json(path: Path, found: dict[Row, Evaluation], origin: dict) -> None:
     rows = [
-        {"policy": row.policy, "setting": row.setting, "station": row.station}
+        {
+            "policy": row.policy,
+            "scenario": row.scenario,
+            "setting": row.setting,
+            "station": row.station,
+        }
         | dataclasses.asdict(figures)
         for row, figures in found.items()
     ]
