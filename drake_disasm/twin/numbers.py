@@ -135,6 +135,7 @@ class _Case:
             scenario.arm,
             scenario.gripper,
             scenario.ft_sensor.model,
+            scenario.ft_sensor.place,
             scenario.task.period,
         )
         return cls(repr(parts), scenario)

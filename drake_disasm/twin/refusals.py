@@ -110,16 +110,16 @@ def refuse_scenarios(scenarios: Sequence[Scenario]) -> None:
 
 
 def refuse_sensor_elsewhere(scenario: Scenario) -> None:
-    """Refuses a sensor that is not in the wrist.
+    """Refuses a sensor under the part.
 
     Raises:
         DisasmError: says what to use instead.
     """
     place = scenario.ft_sensor.place
-    if place != "wrist":
+    if place == "part":
         raise DisasmError(
-            f"ft_sensor.place: '{place}' has no form for a batch; set it to wrist, or "
-            "use the diagram's twin with contact.model hydroelastic"
+            f"ft_sensor.place: '{place}' has no form for a batch; set it to wrist or "
+            "none, or use the diagram's twin with contact.model hydroelastic"
         )
 
 

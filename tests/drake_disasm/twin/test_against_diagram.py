@@ -202,3 +202,9 @@ def test_a_gpu_simulates_the_same_episodes(batch):
     found = [to_numpy(twin.reset([0] * len(CASES))).copy()]
     found += [to_numpy(twin.step(action).observation).copy() for action in moves]
     _assert_same(np.array(found).reshape(-1, 12), batch.reshape(-1, 12))
+
+
+def test_springs_tell_the_wrench_as_the_diagrams_where_there_is_no_sensor():
+    settings = [*SETTINGS, "ft_sensor.place=none"]
+    scenario, moves = load_scenario("removal_turned", settings), actions(BEGIN)
+    _assert_same(_batch([scenario], moves)[:, 0], _diagram(scenario, moves))
