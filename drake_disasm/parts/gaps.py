@@ -10,15 +10,17 @@ from typing import ClassVar, Self
 from drake_disasm.common.arrays import Array
 from drake_disasm.effects import Environment
 
-#: Which gaps a row is of, its first number.
-SLOT, HOLE, BAYONET = 0.0, 1.0, 2.0
-#: Numbers of a row, of whatever gaps.
+#: Numbers of a row, of whatever gaps: `twin.equations` has as many.
 GAPS_SIZE = 16
 
 
 @dataclasses.dataclass(frozen=True)
 class Gaps(abc.ABC):
-    """Gaps of one kind; a length is a number, or (n,) of n parts."""
+    """Gaps of one kind; a length is a number, or (n,) of n parts.
+
+    Attributes:
+        kind: by which `twin.equations` knows what a row is of.
+    """
 
     kind: ClassVar[float]
 
@@ -62,7 +64,7 @@ class SlotGaps(Gaps):
     top: float | Array
     bottom: float | Array
 
-    kind: ClassVar[float] = SLOT
+    kind: ClassVar[float] = 0.0
 
     def changed_by(self, environment: Environment) -> "SlotGaps":
         """See Gaps: the slot's width."""
@@ -90,7 +92,7 @@ class HoleGaps(Gaps):
     tip: float | Array
     floor: float | Array
 
-    kind: ClassVar[float] = HOLE
+    kind: ClassVar[float] = 1.0
 
     def changed_by(self, environment: Environment) -> "HoleGaps":
         """See Gaps: the hole's width."""
@@ -130,7 +132,7 @@ class BayonetGaps(Gaps):
     detent: float | Array
     detent_width: float | Array
 
-    kind: ClassVar[float] = BAYONET
+    kind: ClassVar[float] = 2.0
 
     def changed_by(self, environment: Environment) -> "BayonetGaps":
         """See Gaps: the hole's width, and the detent."""

@@ -16,7 +16,6 @@ import math
 import numpy as np
 
 from drake_disasm.common.compiled import compiled
-from drake_disasm.parts.gaps import GAPS_SIZE, HOLE, SLOT
 
 _MM = 1000.0
 _LEAST = 1e-12  # mm: a power of zero has no slope
@@ -32,6 +31,8 @@ _RIM_POINTS = 8
 _ANGLES = 2.0 * np.pi * np.arange(_RIM_POINTS) / _RIM_POINTS
 _RIM = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
 
+#: Kinds of `parts.gaps`, and how many numbers a row of them has.
+SLOT, HOLE, BAYONET, GAPS_SIZE = 0.0, 1.0, 2.0, 16
 #: How many places of a part can touch, at most.
 PLACES = 24
 _STOPS, _PLANES = 6, 8  # a slot's first places at the stops, and at lips and floor
@@ -846,7 +847,7 @@ def find_places(w: np.ndarray) -> None:
         _face(k, 0.0, 0.0, 0.0, w)
     if kind == HOLE:
         _find_hole(w)
-    else:
+    elif kind == BAYONET:
         _find_bayonet(w)
 
 

@@ -4,16 +4,20 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from drake_disasm.parts import Bayonet, ContactConfig, DoorChain, PegInHole
+from drake_disasm.parts import Bayonet, ContactConfig, DoorChain, PegInHole, gaps
 from drake_disasm.twin.equations import (
     ARM,
+    BAYONET,
     DEPTH,
     GAPS,
+    GAPS_SIZE,
+    HOLE,
     NORMAL,
     P_GBO,
     PLACES,
     R_GB,
     SIZE,
+    SLOT,
     SPRING,
     find_places,
 )
@@ -32,6 +36,12 @@ def places(R, p):
     find_places(w)
     arms, normals = (w[at : at + 3 * PLACES].reshape(-1, 3) for at in (ARM, NORMAL))
     return w[DEPTH : DEPTH + PLACES], arms, normals
+
+
+def test_the_equations_know_the_gaps_of_parts():
+    kinds = (gaps.SlotGaps.kind, gaps.HoleGaps.kind, gaps.BayonetGaps.kind)
+    assert kinds == (SLOT, HOLE, BAYONET) and gaps.GAPS_SIZE == GAPS_SIZE
+    assert len(DoorChain().gaps.row) == len(Bayonet().gaps.row) == GAPS_SIZE
 
 
 def deepest(position):

@@ -62,7 +62,7 @@ def test_a_driver_that_restarts_is_silent_and_counts_anew(cell: FakeCell) -> Non
     while cell.time < cell._restarted_at - 0.01:
         cell.send_measurements()
         cell._lcm.HandleSubscriptions(0)
-    assert monitor.read() is silent and cell.commands == commands
+    assert monitor.read().time == silent.time and cell.commands == commands
     for _ in range(5):
         cell.send_measurements()
         cell._lcm.HandleSubscriptions(0)
