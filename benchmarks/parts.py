@@ -185,8 +185,8 @@ def learning_rows(files: Sequence[Path]) -> Iterator[tuple[Cell, ...]]:
     rows = [row for file in files for row in json.loads(file.read_text())["rows"]]
     groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for row in rows:
-        path = Path(row["policy"])
-        name = path.parent.name if path.parent.name else path.name
+        path = Path(row["policy"])  # TRAINING/seed_000/policy.npz
+        name = path.parts[-3] if len(path.parts) > 2 else path.name
         groups.setdefault((row["scenario"], row["station"], name), []).append(row)
     for key, own in groups.items():
         right, count = (sum(r[name] for r in own) for name in ("successes", "episodes"))
