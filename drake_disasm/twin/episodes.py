@@ -16,7 +16,7 @@ from drake_disasm.effects import BoltMotion, MotionEffect
 from drake_disasm.scenario import Scenario, with_values
 from drake_disasm.twin.numbers import TwinNumbers
 from drake_disasm.twin.plant import Plant, PlantState
-from drake_disasm.twin.refusals import refuse_sensor_elsewhere
+from drake_disasm.twin.refusals import refuse_sensor_under_part
 from drake_disasm.twin.scalar_effects import refuse_scalar_effects
 from drake_disasm.twin.slots import EffectSlots
 from drake_disasm.twin.stacking import leaves_of, shared, with_leaves
@@ -76,8 +76,8 @@ class TwinBatch:
         threads: of the host, which share the environments.
 
     Raises:
-        DisasmError: the equation of a user's own effect takes no arrays, or the sensor
-            is not in the wrist.
+        DisasmError: the equation of a user's own effect takes no arrays, or a sensor
+            lies under the part.
     """
 
     def __init__(
@@ -86,7 +86,8 @@ class TwinBatch:
         self.like, self.slots, self._threads = like, EffectSlots(scenarios), threads
         refuse_scalar_effects(self.slots.slots, like)
         first = scenarios[0]
-        refuse_sensor_elsewhere(first)
+        for scenario in scenarios:
+            refuse_sensor_under_part(scenario)
         self.period = first.task.period
         self.h = first.simulation.twin_time_step
         self._per_sample = max(1, round(first.ft_sensor.period / self.h))

@@ -932,17 +932,11 @@ def _face(k: int, x: float, y: float, z: float, w: np.ndarray) -> None:
 
 
 @compiled
-def _arm(x: float, y: float, z: float, axis: int, w: np.ndarray) -> float:
-    """Returns an element of a point of the moved body, from Bo in G [m]."""
-    row = R_GB + 3 * axis
-    return float(w[row] * x + w[row + 1] * y + w[row + 2] * z)
-
-
-@compiled
 def _point(k: int, x: float, y: float, z: float, w: np.ndarray) -> None:
     """Sets a place's arm to a point of the moved body, given in B [m]."""
     for axis in range(3):
-        w[ARM + 3 * k + axis] = _arm(x, y, z, axis, w)
+        row = R_GB + 3 * axis
+        w[ARM + 3 * k + axis] = w[row] * x + w[row + 1] * y + w[row + 2] * z
 
 
 @compiled
@@ -1053,14 +1047,23 @@ def _find_bayonet(w: np.ndarray) -> None:
 def _across_notch(k: int, w: np.ndarray) -> float:
     """Returns how far a place is from the middle of the notches, signed [m]."""
     x, z = w[P_GBO] + w[ARM + 3 * k], w[P_GBO + 2] + w[ARM + 3 * k + 2]
-    return float(w[GAPS + 10] * x + w[GAPS + 9] * z)
+    cosine, sine = w[GAPS + 9], w[GAPS + 10]
+    return float(sine * x + cosine * z)
 
 
 @compiled
 def _along_notch(k: int, w: np.ndarray) -> float:
     """Returns how far out along the notches a place is, signed [m]."""
     x, z = w[P_GBO] + w[ARM + 3 * k], w[P_GBO + 2] + w[ARM + 3 * k + 2]
-    return float(w[GAPS + 9] * x - w[GAPS + 10] * z)
+    cosine, sine = w[GAPS + 9], w[GAPS + 10]
+    return float(cosine * x - sine * z)
+
+
+@compiled
+def _face_across(k: int, sign: float, w: np.ndarray) -> None:
+    """Sets a place's normal across the notches, to one side or the other."""
+    cosine, sine = w[GAPS + 9], w[GAPS + 10]
+    _face(k, sign * sine, 0.0, sign * cosine, w)
 
 
 @compiled
@@ -1092,7 +1095,7 @@ def _lug_at_stop(k: int, sign: float, corner: int, w: np.ndarray) -> None:
     middle = (w[GAPS + 7] + w[GAPS + 8]) / 2.0
     reach = end if corner == 0 else hole
     _point(k, sign * reach, middle, -sign * half, w)
-    _face(k, sign * w[GAPS + 10], 0.0, sign * w[GAPS + 9], w)
+    _face_across(k, sign, w)
     if w[P_GBO + 1] + middle < -plate:
         w[DEPTH + k] = -sign * _across_notch(k, w) - w[GAPS + 13]
 
@@ -1105,7 +1108,7 @@ def _lug_in_notch(k: int, sign: float, corner: int, w: np.ndarray) -> None:
     side = 1.0 - 2.0 * corner
     middle = (max(py + bottom, -plate) + min(py + top, 0.0)) / 2.0
     _point(k, sign * end, middle - py, side * half, w)
-    _face(k, -side * w[GAPS + 10], 0.0, -side * w[GAPS + 9], w)
+    _face_across(k, -side, w)
     depth = side * _across_notch(k, w) - half_notch
     is_raised = py + top + plate > max(0.0, depth) and py + bottom < 0.0
     w[DEPTH + k] = depth if is_raised else -1.0

@@ -97,7 +97,6 @@ def refuse_scenarios(scenarios: Sequence[Scenario]) -> None:
     """
     for scenario in {repr(s): s for s in scenarios}.values():
         validate(scenario)
-        refuse_sensor_elsewhere(scenario)
         _refuse_contact(scenario)
         refuse_unknown_kinds(scenario.effects)
         refuse_arm_effects([e for e in scenario.effects if isinstance(e, ArmEffect)])
@@ -109,7 +108,7 @@ def refuse_scenarios(scenarios: Sequence[Scenario]) -> None:
             _refuse_others(corner(scenario, end), corner(scenarios[0], "low"))
 
 
-def refuse_sensor_elsewhere(scenario: Scenario) -> None:
+def refuse_sensor_under_part(scenario: Scenario) -> None:
     """Refuses a sensor under the part.
 
     Raises:

@@ -7,6 +7,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from drake_disasm.cell.coordinates import BoltCoordinates
+from drake_disasm.cell.grip import JOINT_OF_AXIS
 from drake_disasm.common.arrays import Array, apply_matrix, cross
 from drake_disasm.effects import BoltMotion
 from drake_disasm.scenario import Scenario
@@ -80,7 +81,7 @@ def bolt_motion(
     """
     X_GB = coordinates.poses(q_bolt)
     p_BoTo = apply_matrix(X_GB.R, p_BoTo_B)
-    rate_of_turn = qd_rate[..., [4, 5, 3]]  # about x, y, z while small
+    rate_of_turn = qd_rate[..., list(JOINT_OF_AXIS[3:])]  # while small
     v = qd_rate[..., :3] - cross(rate_of_turn, p_BoTo)
     return BoltMotion(X_GB.p, v, time)
 

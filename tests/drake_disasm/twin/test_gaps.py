@@ -25,15 +25,17 @@ from drake_disasm.twin.equations import (
 MM = 1e-3
 
 
-def places(R, p):
+def found_places(part, R, p):
+    """Returns the workspace of a part whose moved body is at X_GB = (R, p)."""
     w = np.full(SIZE, np.nan)
-    for place, numbers in (
-        (GAPS, DoorChain().gaps.row),
-        (R_GB, R),
-        (P_GBO, p),
-    ):
+    for place, numbers in ((GAPS, part.gaps.row), (R_GB, R), (P_GBO, p)):
         w[place : place + np.size(numbers)] = np.ravel(numbers)
     find_places(w)
+    return w
+
+
+def places(R, p):
+    w = found_places(DoorChain(), R, p)
     arms, normals = (w[at : at + 3 * PLACES].reshape(-1, 3) for at in (ARM, NORMAL))
     return w[DEPTH : DEPTH + PLACES], arms, normals
 
@@ -90,11 +92,7 @@ def test_another_clearance_is_the_lock_s_with_that_clearance():
 
 def touching(part, p, R=None):
     """Returns depths [mm] and normals of the places that touch, and the spring's."""
-    w = np.full(SIZE, np.nan)
-    R = np.eye(3) if R is None else R
-    for place, numbers in ((GAPS, part.gaps.row), (R_GB, R), (P_GBO, p)):
-        w[place : place + np.size(numbers)] = np.ravel(numbers)
-    find_places(w)
+    w = found_places(part, np.eye(3) if R is None else R, p)
     depth = w[DEPTH : DEPTH + PLACES]
     normals = w[NORMAL : NORMAL + 3 * PLACES].reshape(-1, 3)
     return depth[depth > 0] / MM, normals[depth > 0], w[SPRING : SPRING + 3]
