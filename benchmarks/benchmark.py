@@ -54,7 +54,7 @@ from drake_disasm.common.files import make_folder, write_json
 from drake_disasm.common.quantity import closest
 from drake_disasm.common.timing import boundary
 from drake_disasm.mdp import Outcome
-from drake_disasm.policies import ActionMap, LearnedPolicy, Network, make_policy
+from drake_disasm.policies import LearnedPolicy, Network, TaskView, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import make_station
 from drake_disasm.stations.hardware_config import load_hardware_config
@@ -334,7 +334,7 @@ def measure_inference() -> Iterator[Figure]:
         tuple(generator.normal(0.0, 0.1, size).astype(np.float32) for size in sizes),
         tuple(np.zeros(rows, np.float32) for rows, _ in sizes),
     )
-    policy = LearnedPolicy(network, np.ones(12), ActionMap(np.ones(6)))
+    policy = LearnedPolicy(network, TaskView(np.ones(12), np.ones(6)))
     observation = generator.standard_normal(12)
     ours = _short_time(lambda: policy(observation))
     theirs = _torch_inference(network)

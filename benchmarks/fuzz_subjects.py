@@ -31,10 +31,10 @@ from drake_disasm.logs.files import unfinished_path
 from drake_disasm.logs.header import read_header
 from drake_disasm.logs.schema import KINDS, Form, Quantity, Rule
 from drake_disasm.policies import (
-    ActionMap,
     Admittance,
     LearnedPolicy,
     Network,
+    TaskView,
     load_policy,
     save_policy,
 )
@@ -76,8 +76,8 @@ def _policy() -> Subject:
         tuple(rng.normal(size=width).astype(np.float32) for width in widths),
         tuple(rng.normal(size=width[0]).astype(np.float32) for width in widths),
     )
-    to_action = ActionMap(np.ones(6), Admittance())
-    save_policy(path, LearnedPolicy(network, np.ones(12), to_action))
+    view = TaskView(np.ones(12), np.ones(6), Admittance())
+    save_policy(path, LearnedPolicy(network, view))
     return file_subject("p.npz", _archive(path.read_bytes(), POLICY), load_policy)
 
 

@@ -19,7 +19,7 @@ from drake_disasm.learning.environments import make_environments
 from drake_disasm.learning.hyperparameters import Hyperparameters
 from drake_disasm.learning.replay import split
 from drake_disasm.learning.run import run_trainings
-from drake_disasm.learning.training import Training, TrainingSpec, action_map
+from drake_disasm.learning.training import Training, TrainingSpec, task_view
 from drake_disasm.scenario import load_scenario
 
 
@@ -78,8 +78,7 @@ def main(episodes: int = 24) -> None:
                 MyopicAgent(),
                 config,
                 seed=0,
-                scale=np.array(config.observation_scale),
-                action_map=action_map(scenario, config),
+                view=task_view(scenario, config),
                 exploration_unit=scenario.task.max_translation,
             )
             run_trainings(

@@ -19,6 +19,7 @@ from drake_disasm.learning.environments import GymnasiumRows
 from drake_disasm.learning.hyperparameters import Hyperparameters
 from drake_disasm.learning.loop import TrainingLoop
 from drake_disasm.learning.training import Training
+from drake_disasm.policies import TaskView
 
 MASS, FRICTION, PERIOD, STEPS = 0.5, 1.0, 0.05, 20  # kg, N, s
 
@@ -64,8 +65,8 @@ def main(episodes: int = 120) -> None:
     )
     states, actions = rows.sizes
     agent = ActorCritic(config, 0, compiled=False, states=states, actions=actions)
-    scale = np.array([0.2, 1.0])  # m, m/s
-    training = Training(agent, config, seed=0, scale=scale, sizes=rows.sizes)
+    view = TaskView(np.array([0.2, 1.0]), np.ones(actions))  # m, m/s
+    training = Training(agent, config, seed=0, view=view, sizes=rows.sizes)
     loop = TrainingLoop(rows, [training])
     while loop.unfinished:
         loop.run_round()

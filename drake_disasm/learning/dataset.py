@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from drake_disasm.learning.hyperparameters import Hyperparameters
 from drake_disasm.learning.replay import Replay
 from drake_disasm.mdp import BoltState, TaskGeometry, reward_terms
-from drake_disasm.policies import ActionMap
+from drake_disasm.policies import TaskView
 from drake_disasm.scenario import Scenario
 
 
@@ -15,8 +14,7 @@ def remember(
     actions: np.ndarray,
     terminated: bool,
     scenario: Scenario,
-    action_map: ActionMap,
-    config: Hyperparameters,
+    view: TaskView,
 ) -> None:
     """Adds one recorded episode to a replay memory.
 
@@ -30,14 +28,13 @@ def remember(
         actions: (T, 6) un-noised actions [m, rad].
         terminated: whether the task itself ended the episode.
         scenario: of the task: defines the reward.
-        action_map: of the agent.
-        config: of the agent, for the scales of the state.
+        view: of the agent.
     """
-    scaled = observations / np.array(config.observation_scale)
+    seen = view.observe(observations)
     before, after = (
         BoltState.from_vector(observations[k:][: len(actions)]) for k in (0, 1)
     )
     terms = reward_terms(before, after, scenario.task, TaskGeometry.of(scenario))
-    chosen = action_map.from_action(observations[:-1], actions)
+    chosen = view.from_action(observations[:-1], actions)
     ends = np.arange(1, len(actions) + 1) == len(actions)
-    replay.add(scaled[:-1], chosen, sum(terms.values()), scaled[1:], terminated & ends)
+    replay.add(seen[:-1], chosen, sum(terms.values()), seen[1:], terminated & ends)

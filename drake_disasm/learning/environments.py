@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.wrappers.vector import RescaleAction
 
-from drake_disasm.common.arrays import Array
+from drake_disasm.common.arrays import Array, namespace
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.learning.environment import DisassemblyEnv
 from drake_disasm.learning.training import TrainingSpec
@@ -33,6 +33,30 @@ class Step(BatchResult):
 
     seen: Array
     counts: Array
+
+    @classmethod
+    def joined(cls, steps: Sequence["Step"], order: np.ndarray) -> "Step":
+        """Returns the steps of several environments as those of one.
+
+        Args:
+            steps: of the environments.
+            order: (n,) which of their rows, one after another, each row is.
+        """
+        xp = namespace(steps[0].seen)
+        terms = {
+            name: xp.concat([step.reward_terms[name] for step in steps])[order]
+            for name in steps[0].reward_terms
+        }
+        failure = [why for step in steps for why in step.failure]
+        others = ("observation", "place", "outcome", "has_failed", "seen", "counts")
+        return cls(
+            reward_terms=terms,
+            failure=[failure[row] for row in order],
+            **{
+                name: xp.concat([getattr(step, name) for step in steps])[order]
+                for name in others
+            },
+        )
 
     def rows(self, which: slice) -> "Step":
         """Returns the step of some environments."""
@@ -69,16 +93,18 @@ class Environments(Protocol):
 
 
 class DiagramRow:
-    """The diagram as one row."""
+    """The diagram as one row; after an episode's end it stands still."""
 
     count = 1
 
     def __init__(self, scenario: Scenario, station: str) -> None:
         self._env = DisassemblyEnv(scenario, station)
         self._recorder: EpisodeRecorder
+        self._last: Step | None = None
 
     def begin(self, rows: np.ndarray, seeds: Sequence[int]) -> np.ndarray:
         """Resets the diagram."""
+        self._last = None
         observation, _ = self._env.reset(seed=seeds[0])
         self._recorder = EpisodeRecorder(self._env.simulation)
         self._recorder.measure()
@@ -86,11 +112,13 @@ class DiagramRow:
 
     def step(self, actions: np.ndarray) -> Step:
         """Steps the diagram; what the arm can't do is learned from, as an end."""
+        if self._last is not None and self._last.outcome[0] != Outcome.RUNNING:
+            return self._last
         observation, *_ = self._env.step(actions[0])
         result = self._env.result
         if result.is_whole:
             self._recorder.acted(result)
-        return Step(
+        self._last = Step(
             result.observation[None],
             result.place[None],
             {name: np.array([term]) for name, term in result.reward_terms.items()},
@@ -100,6 +128,7 @@ class DiagramRow:
             seen=observation[None],
             counts=np.array([result.is_whole]),
         )
+        return self._last
 
     def bolt_is_out(self) -> np.ndarray:
         """Asks the simulation."""
@@ -154,6 +183,52 @@ class TwinRows:
     def recorded(self, row: int, steps: int) -> Columns | None:
         """Returns what the history has, if there is one."""
         return self._history.episode(row, steps) if self._history else None
+
+
+class JoinedRows:
+    """Environments of several tasks as those of one.
+
+    Args:
+        parts: of each task the rows (m,) that are its, in order, and its environments.
+    """
+
+    def __init__(self, parts: Sequence[tuple[np.ndarray, Environments]]) -> None:
+        self._parts = list(parts)
+        #: Which of the parts' rows, one after another, each row is.
+        self._order = np.argsort(np.concatenate([rows for rows, _ in parts]))
+        self.count = len(self._order)
+        self._seen: list[Array] = [None] * len(self._parts)
+
+    def begin(self, rows: np.ndarray, seeds: Sequence[int]) -> Array:
+        """Begins episodes in those of the tasks that have such rows."""
+        seed_of = dict(zip(rows.tolist(), seeds, strict=True))
+        for number, (own, environments) in enumerate(self._parts):
+            new = np.flatnonzero(np.isin(own, rows))
+            if len(new):
+                own_seeds = [seed_of[row] for row in own[new].tolist()]
+                self._seen[number] = environments.begin(new, own_seeds)
+        return self._joined(self._seen)
+
+    def step(self, actions: Array) -> Step:
+        """Steps all tasks."""
+        steps = [each.step(actions[rows]) for rows, each in self._parts]
+        self._seen = [step.seen for step in steps]
+        return Step.joined(steps, self._order)
+
+    def bolt_is_out(self) -> Array:
+        """Asks all tasks."""
+        return self._joined([each.bolt_is_out() for _, each in self._parts])
+
+    def recorded(self, row: int, steps: int) -> Columns | None:
+        """Asks the task whose row it is."""
+        for rows, environments in self._parts:
+            if row in rows:
+                own = int(np.flatnonzero(rows == row)[0])
+                return environments.recorded(own, steps)
+        return None
+
+    def _joined(self, values: Sequence[Array]) -> Array:
+        return namespace(values[0]).concat(list(values))[self._order]
 
 
 class GymnasiumRows:
@@ -256,14 +331,35 @@ def _size_of(name: str, space: gymnasium.Space[Any]) -> int:
 
 def make_environments(
     specs: Sequence[TrainingSpec], is_batch: bool = False, is_recorded: bool = True
-) -> DiagramRow | TwinRows:
-    """Returns the environments of trainings on the task.
+) -> Environments:
+    """Returns the environments of trainings on their tasks.
 
     Args:
-        specs: one; or several, each of which gets one twin of a batch.
+        specs: one; or several, each of which gets one twin of a batch for each task.
         is_batch: whether one episode at a time runs on a batch, too.
         is_recorded: as of `TwinRows`.
     """
+    first = specs[0]
+    if not first.others:
+        return _environments(specs, is_batch, is_recorded)
+    count, tasks = first.envs, len(first.scenarios)
+    rows = np.arange(len(specs) * tasks * count).reshape(len(specs), tasks, count)
+    parts = []
+    for task in range(tasks):
+        own = [_of_task(spec, task) for spec in specs]
+        environments = _environments(own, is_batch, is_recorded)
+        parts.append((rows[:, task].ravel(), environments))
+    return JoinedRows(parts)
+
+
+def _of_task(spec: TrainingSpec, task: int) -> TrainingSpec:
+    return dataclasses.replace(spec, scenario=spec.scenarios[task], others=())
+
+
+def _environments(
+    specs: Sequence[TrainingSpec], is_batch: bool, is_recorded: bool
+) -> DiagramRow | TwinRows:
+    """Returns the environments of trainings on one task each."""
     first = specs[0]
     if len(specs) == 1 and first.envs == 1 and not is_batch:
         return DiagramRow(first.scenario, first.station)

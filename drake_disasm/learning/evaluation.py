@@ -9,8 +9,8 @@ from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progre
 from drake_disasm.effects import Effect
 from drake_disasm.learning.statistics import wilson_interval
 from drake_disasm.mdp import Outcome
+from drake_disasm.policies import LearnedPolicy
 from drake_disasm.scenario import Scenario
-from drake_disasm.systems.policy import Policy
 from drake_disasm.task.episode import EpisodeSummary, run_episode
 from drake_disasm.task.simulation import TaskSimulation
 
@@ -69,15 +69,29 @@ def evaluate(
 
 
 def validate_policy(
-    policy: Policy,
-    scenario: Scenario,
+    policy: LearnedPolicy,
+    scenarios: Sequence[Scenario],
     station: str,
     seeds: Sequence[int],
     progress: Progress = ignore_progress,
 ) -> Evaluation:
-    """Evaluates a policy in a diagram of its own, so that no training is affected."""
-    simulation = TaskSimulation(scenario, station, policy)
-    return summed_up(evaluate(simulation, seeds, progress=progress))
+    """Evaluates a policy in diagrams of its own, so that no training is affected.
+
+    Args:
+        policy: fits all scenarios.
+        scenarios: of the tasks; each runs all episodes.
+        station: "twin" or "cell".
+        seeds: one per episode.
+        progress: called after each episode.
+    """
+    summaries = list[EpisodeSummary]()
+    total = len(scenarios) * len(seeds)
+    for scenario in scenarios:
+        simulation = TaskSimulation(scenario, station, policy.acting_on(scenario))
+        for seed in seeds:
+            summaries.append(run_episode(simulation, seed, is_judged=True))
+            progress(ProgressUpdate("evaluating", len(summaries), total))
+    return summed_up(summaries)
 
 
 def summed_up(summaries: Sequence[EpisodeSummary]) -> Evaluation:

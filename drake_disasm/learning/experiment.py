@@ -38,7 +38,8 @@ class Experiment:
     """What all seeds of a training have in common.
 
     Attributes:
-        scenario, station, config, compiled, threads, envs, device: as in TrainingSpec.
+        scenario, station, config, compiled, threads, envs, device, others: as in
+            TrainingSpec.
         lockstep: whether seeds are trained side by side, on a batch of twins.
         preset: name of the hyper-parameters that `config` started from.
         validation: greedy episodes after each training, for its result.
@@ -66,9 +67,10 @@ class Experiment:
     envs: int = 1
     lockstep: bool = False
     device: str = "numpy"
+    others: tuple[Scenario, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuses several episodes at a time, or a device, where there is no batch.
+        """Refuses what does not go together.
 
         Raises:
             DisasmError: says what to give instead.
@@ -96,11 +98,35 @@ class Experiment:
                 "`envs`, or leave `device` out"
             )
         make_like(self.device)
+        self._refuse_other_tasks()
+
+    def _refuse_other_tasks(self) -> None:
+        """Refuses further tasks that one agent can't learn with the first."""
+        if not self.others:
+            return
+        if self.logs or self.demonstrations:
+            raise DisasmError(
+                "also: logs are of one task; leave out the further scenarios, or logs "
+                "to learn from"
+            )
+        ways = {scenario.part.way for scenario in (self.scenario, *self.others)}
+        if len(ways) > 1 and self.config.axes != "stage":
+            raise DisasmError(
+                f"also: parts that leave by {' and '.join(sorted(ways))} look alike in "
+                "the axes of their stages only; give the hyper-parameter axes=stage"
+            )
+        for other in self.others:
+            if other.task.period != self.scenario.task.period:
+                raise DisasmError(
+                    f"also: '{other.name}' has task.period {other.task.period:g}, not "
+                    f"{self.scenario.task.period:g} s; set it to the same"
+                )
 
     @property
     def is_recorded(self) -> bool:
         """Whether each episode's rows go into a log; of many they would fill a disk."""
-        return not self.logs and self.envs < MOST_RECORDED
+        has_log = not self.logs and not self.others  # which has one scenario
+        return has_log and self.envs < MOST_RECORDED
 
     @property
     def is_batched(self) -> bool:
@@ -118,6 +144,7 @@ class Experiment:
             self.threads,
             self.envs,
             self.device,
+            self.others,
         )
 
     def to_mapping(self) -> dict[str, Any]:
@@ -126,6 +153,7 @@ class Experiment:
             field.name: getattr(self, field.name) for field in dataclasses.fields(self)
         }
         mapping["scenario"] = scenario_to_mapping(self.scenario)
+        mapping["others"] = [scenario_to_mapping(other) for other in self.others]
         mapping["config"] = dataclasses.asdict(self.config)
         return mapping
 
@@ -151,11 +179,15 @@ def open_experiment(experiment: Experiment, folder: Path, resume: bool) -> Exper
 def _with_station(found: dict[str, Any]) -> dict[str, Any]:
     """Returns a training's plain data; an older one called the station "model".
 
-    And it had one environment, no device, and a process for each seed.
+    And it had one environment, no device, a process for each seed, one task, and the
+    groove's axes.
     """
     if "model" in found:
         found["station"] = found.pop("model")
-    return {"envs": 1, "lockstep": False, "device": "numpy"} | found
+    if isinstance(found.get("config"), dict):
+        found["config"] = {"axes": "groove"} | found["config"]
+    added = {"envs": 1, "lockstep": False, "device": "numpy", "others": []}
+    return added | found
 
 
 def read_training(folder: Path, example: dict[str, Any]) -> dict[str, Any]:

@@ -95,6 +95,13 @@ class Hyperparameters:
         low=0.0,
         high=1.0,
     )
+    axes: str = quantity(
+        "groove",
+        "",
+        "in which the agent sees and acts: the groove's, or those of the stage that "
+        "the bolt is in (`StageAxes`), which fit any part",
+        choices=("groove", "stage"),
+    )
     position_scale: float = quantity(0.01, "m", "of the state", low=1e-6, high=1e3)
     rotation_scale: float = quantity(0.035, "rad", "of the state", low=1e-6, high=1e3)
     force_scale: float = quantity(5.0, "N", "of the state", low=1e-6, high=1e6)

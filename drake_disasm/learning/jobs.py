@@ -17,7 +17,7 @@ from drake_disasm.learning.environments import (
 from drake_disasm.learning.experiment import Experiment, seed_folder
 from drake_disasm.learning.replay import Replay
 from drake_disasm.learning.run import finish, run_trainings
-from drake_disasm.learning.training import Training, action_map, make_training
+from drake_disasm.learning.training import Training, make_training, task_view
 from drake_disasm.learning.warm_start import start_checkpoint, start_hash
 from drake_disasm.logs import LogWriter, read_logs
 from drake_disasm.logs.transitions import observations
@@ -167,7 +167,7 @@ def _memory(experiment: Experiment, folders: Collection[str]) -> Replay | None:
     episodes = [e for log in read_logs(folders) for e in log.episodes]
     count = sum(episode.rows - 1 for episode in episodes)
     replay = Replay(count, device=experiment.device)
-    actions = action_map(scenario, config)
+    view = task_view(scenario, config)
     for episode in episodes:
         remember(
             replay,
@@ -175,7 +175,6 @@ def _memory(experiment: Experiment, folders: Collection[str]) -> Replay | None:
             episode["action"][:-1],
             bool(episode["terminated"][-1]),
             scenario,
-            actions,
-            config,
+            view,
         )
     return replay

@@ -38,16 +38,15 @@ class _Round:
         self._noise = training.noise(first, count)
         sigma = np.array([[training.sigma(n)] for n in numbers], np.float32)
         self._sigma = training.placed(sigma)
-        self._scale = training.placed(training.scale)
         self._seen: Array
         self._chosen: Array
 
     def act(self, before: Array) -> Array:
         """Returns exploring actions (k, a) for observations (k, s); 0 after an end."""
         training, xp = self.training, namespace(before)
-        self._seen = xp.astype(before / self._scale, xp.float32)
+        self._seen = xp.astype(training.view.observe(before), xp.float32)
         self._chosen = training.agent.explore(self._seen, self._noise(), self._sigma)
-        actions = training.action_map.to_action(before, self._chosen)
+        actions = training.view.to_action(before, self._chosen)
         return xp.where(self.is_running[:, None], actions, 0.0)
 
     def take(self, step: Step) -> Array:
@@ -64,7 +63,7 @@ class _Round:
             self._seen,
             self._chosen,
             step.reward,
-            step.seen / self._scale,
+            training.view.observe(step.seen),
             step.terminated,
             running & ~step.has_failed,
         )

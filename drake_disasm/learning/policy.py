@@ -3,9 +3,7 @@
 import dataclasses
 from typing import Any
 
-import numpy as np
-
-from drake_disasm.learning.training import TrainingSpec, action_map
+from drake_disasm.learning.training import TrainingSpec, task_view
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 from drake_disasm.policies import (
     LearnedPolicy,
@@ -25,11 +23,10 @@ def trained_policy(
         spec: of the training.
         provenance: command, date, seed, versions, commit.
     """
-    task = spec.scenario.task
+    tasks = [scenario.task for scenario in spec.scenarios]
     return LearnedPolicy(
         network=_greedy(network),
-        observation_scale=np.array(spec.config.observation_scale),
-        action_map=action_map(spec.scenario, spec.config),
+        view=task_view(spec.scenario, spec.config),
         description=PolicyDescription(
             agent=spec.config.algorithm,
             preset=provenance.get("preset", ""),
@@ -39,9 +36,9 @@ def trained_policy(
             state_names=STATE_NAMES,
             action_names=ACTION_NAMES,
             observation_variant=spec.scenario.observation.variant,
-            period=task.period,
-            max_translation=task.max_translation,
-            max_rotation=task.max_rotation,
+            period=tasks[0].period,
+            max_translation=min(task.max_translation for task in tasks),
+            max_rotation=min(task.max_rotation for task in tasks),
             way=spec.scenario.part.way,
             provenance=provenance,
             evaluation={},

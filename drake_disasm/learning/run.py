@@ -117,7 +117,7 @@ def finish(
         spec: of it.
         folder: of the seed.
         provenance: where the policy is from.
-        validation: greedy episodes.
+        validation: greedy episodes of each task.
         progress: called after each of them.
 
     Returns:
@@ -126,7 +126,7 @@ def finish(
     seeds = [seed_for(spec.seed, Purpose.VALIDATION, i) for i in range(validation)]
     assert isinstance(training.agent, ActorCritic)  # what a spec makes
     policy = trained_policy(training.agent.network(), spec, provenance)
-    figures = validate_policy(policy, spec.scenario, spec.station, seeds, progress)
+    figures = validate_policy(policy, spec.scenarios, spec.station, seeds, progress)
     evaluation = dataclasses.asdict(figures)
     description = dataclasses.replace(policy.description, evaluation=evaluation)
     policy = dataclasses.replace(policy, description=description)

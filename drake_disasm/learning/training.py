@@ -33,7 +33,7 @@ from drake_disasm.learning.random_numbers import (
 )
 from drake_disasm.learning.replay import ACTIONS, STATES, Replay
 from drake_disasm.mdp import Outcome, action_bounds
-from drake_disasm.policies import ActionMap, make_policy
+from drake_disasm.policies import StageAxes, TaskView, TaskViews, make_policy
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.episode import EpisodeSummary
 
@@ -60,7 +60,9 @@ class TrainingSpec:
         seed: of everything.
         compiled: whether updates run compiled.
         threads: of torch; with more than one, the order of sums varies.
-        envs: how many episodes run at a time, on a batch of twins; 1: on the diagram.
+        envs: how many episodes of each task run at a time, on a batch of twins; 1: on
+            the diagram.
+        others: further tasks, whose episodes run with the first one's.
         device: "numpy", or where tensors stay from the step to the update.
     """
 
@@ -72,6 +74,12 @@ class TrainingSpec:
     threads: int = 1
     envs: int = 1
     device: str = "numpy"
+    others: tuple[Scenario, ...] = ()
+
+    @property
+    def scenarios(self) -> tuple[Scenario, ...]:
+        """The tasks."""
+        return self.scenario, *self.others
 
 
 class Training:
@@ -85,14 +93,12 @@ class Training:
         replay: its replay memory.
         summaries: of the episodes done.
         rounds: done on a dataset.
-        scale: (s,) what the state is divided by before the agent sees it.
-        action_map: from the agent's output to an action.
+        view: what the agent sees of each row, and what its choices do there.
         seconds: spent in "simulation", "updates" and "saving", resumed runs included.
 
     Args:
         agent, config, seed, device: see above.
-        scale: None: all 1.
-        action_map: None: the agent's output is the action.
+        view: None: the agent sees the state, and its output is the action.
         exploration_unit: what `config.exploration` is divided by.
         demonstrations: transitions to mix into each batch, or None.
         dataset: transitions to learn from without acting, or None.
@@ -107,8 +113,7 @@ class Training:
         seed: int,
         device: str = "numpy",
         *,
-        scale: np.ndarray | None = None,
-        action_map: ActionMap | None = None,
+        view: TaskView | TaskViews | None = None,
         exploration_unit: float = 1.0,
         demonstrations: Replay | None = None,
         dataset: Replay | None = None,
@@ -120,12 +125,9 @@ class Training:
                 f"demonstrations: {config.demonstrations:g} of each batch are to come "
                 "from logs; give some by `demonstrations`"
             )
-        if scale is not None and np.shape(scale) != sizes[:1]:
-            raise DisasmError(f"scale: is of {np.size(scale)} numbers, not {sizes[0]}")
         self.agent, self.config, self.seed, self.device = agent, config, seed, device
         self.replay = dataset or Replay(config.replay, *sizes, device)
-        self.scale = np.ones(sizes[0]) if scale is None else scale
-        self.action_map = action_map or ActionMap(np.ones(sizes[1]))
+        self.view = view or TaskView(np.ones(sizes[0]), np.ones(sizes[1]))
         self.summaries: list[EpisodeSummary] = []
         self.rounds = 0
         self.seconds = {"simulation": 0.0, "updates": 0.0, "saving": 0.0}
@@ -244,16 +246,16 @@ def make_training(
     dataset: Replay | None = None,
     updates: int = 0,
 ) -> Training:
-    """Returns a training on the task, at its beginning; see `Training`."""
+    """Returns a training on its tasks, at its beginning; see `Training`."""
     torch.set_num_threads(spec.threads)
+    views = [task_view(scenario, spec.config) for scenario in spec.scenarios]
     seed = seed_for(spec.seed, Purpose.PARAMETERS)
     return Training(
         ActorCritic(spec.config, seed, spec.compiled, device=spec.device),
         spec.config,
         spec.seed,
         spec.device,
-        scale=np.array(spec.config.observation_scale),
-        action_map=action_map(spec.scenario, spec.config),
+        view=TaskViews(views, spec.envs) if spec.others else views[0],
         exploration_unit=spec.scenario.task.max_translation,
         demonstrations=demonstrations,
         dataset=dataset,
@@ -271,10 +273,14 @@ def clock(trainings: list[Training], name: str) -> Iterator[None]:
         training.seconds[name] += spent / len(trainings)
 
 
-def action_map(scenario: Scenario, config: Hyperparameters) -> ActionMap:
-    """Returns the map from an agent's tanh output to an action of a task."""
+def task_view(scenario: Scenario, config: Hyperparameters) -> TaskView:
+    """Returns what an agent sees of a task, and what its tanh output does there."""
     bounds, share = action_bounds(scenario.task), np.array(config.residual)
-    if not config.base:
-        return ActionMap(bounds * share)
-    scale = np.minimum(bounds, _CORRECTION * share)
-    return ActionMap(scale, make_policy(config.base, scenario))
+    seen, base = np.array(config.observation_scale), None
+    axes = StageAxes.of(scenario) if config.axes == "stage" else None
+    if config.base:
+        bounds = np.minimum(bounds, _CORRECTION * share)
+        base = make_policy(config.base, scenario)
+    else:
+        bounds = bounds * share
+    return TaskView(seen, bounds, base, axes)

@@ -72,6 +72,8 @@ def _compared(
     """Yields what an agent's networks depend on: name, value then, value now."""
     for name in (*_NETWORKS, *_ACTIONS, *_SCALES):
         yield name, before["config"][name], after["config"][name]
+    then = before["config"].get("axes", "groove")  # older ones don't say
+    yield "axes", then, after["config"]["axes"]
     old, new = before["scenario"], after["scenario"]
     for name in _TASK:
         yield f"task.{name}", old["task"][name], new["task"][name]

@@ -10,7 +10,6 @@ from drake_disasm.policies.files import (
 )
 from drake_disasm.policies.named import default_policy, resolve_policy
 from drake_disasm.policies.network import (
-    ActionMap,
     LearnedPolicy,
     Network,
     PolicyDescription,
@@ -21,16 +20,19 @@ from drake_disasm.policies.scripted import (
     Straight,
     make_policy,
 )
+from drake_disasm.policies.task_view import StageAxes, TaskView, TaskViews
 
 __all__ = [
     "SCRIPTED",
-    "ActionMap",
     "Admittance",
     "Exploring",
     "LearnedPolicy",
     "Network",
     "PolicyDescription",
+    "StageAxes",
     "Straight",
+    "TaskView",
+    "TaskViews",
     "default_policy",
     "find_policy",
     "load_policy",

@@ -5,7 +5,7 @@ One .npz holds
     weight_0, bias_0, ...   float32, (out, in) and (out,) of each layer
     observation_scale       float64, (12,) [m, rad, N, N m]
     action_scale            float64, (6,) [m, rad]
-    text                    JSON in UTF-8: format, description, base policy
+    text                    JSON in UTF-8: format, description, base policy, axes
     sha256                  of all of these, with their names, types and shapes
 """
 
@@ -16,6 +16,8 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from drake_disasm.common.archive import (
     ArchiveKind,
     Arrays,
@@ -25,18 +27,19 @@ from drake_disasm.common.archive import (
     save_archive,
 )
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.plain_data import check_like
 from drake_disasm.common.quantity import closest
 from drake_disasm.common.resources import models_dir
 from drake_disasm.common.text import clipped, shown
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
 from drake_disasm.parts import WAYS
 from drake_disasm.policies.network import (
-    ActionMap,
     LearnedPolicy,
     Network,
     PolicyDescription,
 )
-from drake_disasm.policies.scripted import SCRIPTED, Admittance, Straight
+from drake_disasm.policies.scripted import SCRIPTED, Admittance, Straight, name_of
+from drake_disasm.policies.task_view import StageAxes, TaskView
 from drake_disasm.scenario import Scenario, scenario_to_mapping
 
 FORMAT = "drake_disasm/policy/1"
@@ -69,7 +72,7 @@ def save_policy(path: Path, policy: LearnedPolicy) -> None:
         DisasmError: `load_policy` would refuse it (NaN in its weights), or the
             system refuses to write.
     """
-    arrays, base = _arrays(policy), policy.action_map.base
+    arrays, view = _arrays(policy), policy.view
     description = _entries(policy.description)
     try:
         _check(arrays)
@@ -77,8 +80,10 @@ def save_policy(path: Path, policy: LearnedPolicy) -> None:
         text = {
             "format": FORMAT,
             "description": description,
-            "base": None if base is None else _base_to_mapping(base),
+            "base": view.base and _base_to_mapping(view.base),
         }
+        if view.axes is not None:  # what has none is written as it always was
+            text["axes"] = dataclasses.asdict(view.axes)
     except DisasmError as error:
         raise DisasmError(f"policy {path}: is not written, it {error}") from None
     save_archive(path, arrays, text)
@@ -118,8 +123,8 @@ def _arrays(policy: LearnedPolicy) -> Arrays:
     network = policy.network
     arrays = {f"weight_{i}": w for i, w in enumerate(network.weights)}
     arrays |= {f"bias_{i}": b for i, b in enumerate(network.biases)}
-    arrays["observation_scale"] = policy.observation_scale.astype(float)
-    arrays["action_scale"] = policy.action_map.action_scale.astype(float)
+    arrays["observation_scale"] = policy.view.observation_scale.astype(float)
+    arrays["action_scale"] = policy.view.action_scale.astype(float)
     return arrays
 
 
@@ -136,8 +141,12 @@ def _policy(arrays: Arrays, text: dict[str, Any]) -> LearnedPolicy:
     )
     return LearnedPolicy(
         network,
-        arrays["observation_scale"],
-        ActionMap(arrays["action_scale"], _base_from_mapping(text.get("base"))),
+        TaskView(
+            arrays["observation_scale"],
+            arrays["action_scale"],
+            _base_from_mapping(text.get("base")),
+            _axes_from_mapping(text.get("axes")),
+        ),
         _description(text.get("description")),
     )
 
@@ -199,12 +208,7 @@ def _like(example: Any, value: Any, name: str) -> Any:
 
 
 def _base_to_mapping(base: Straight | Admittance) -> dict[str, Any]:
-    for name, kind in SCRIPTED.items():
-        if type(base) is kind:
-            return {"name": name, "parameters": dataclasses.asdict(base)}
-    raise DisasmError(
-        f"has the base {type(base).__name__}; a file can name {', '.join(SCRIPTED)}"
-    )
+    return {"name": name_of(base), "parameters": dataclasses.asdict(base)}
 
 
 def _base_from_mapping(mapping: Any) -> Straight | Admittance | None:
@@ -229,3 +233,20 @@ def _base_from_mapping(mapping: Any) -> Straight | Admittance | None:
         ):
             raise DisasmError(f"sets {key} of '{name}' to {shown(value)}; train anew")
     return SCRIPTED[name](**parameters)
+
+
+def _axes_from_mapping(mapping: Any) -> StageAxes | None:
+    if mapping is None:
+        return None
+    example = {"way": "", "ends": [0.0], "switch": 0.0}
+    try:
+        check_like(mapping, example)
+    except DisasmError as error:
+        raise DisasmError(f"has axes that are damaged ({error}); {AGAIN}") from None
+    axes = StageAxes(mapping["way"], tuple(mapping["ends"]), mapping["switch"])
+    numbers = np.array([*axes.ends, axes.switch])
+    if axes.way not in WAYS or len(axes.way) != len(axes.ends):
+        raise DisasmError(f"has the way {shown(axes.way)} in its axes; {AGAIN}")
+    if not np.isfinite(numbers).all():
+        raise DisasmError(f"has axes that don't end; {AGAIN}")
+    return axes

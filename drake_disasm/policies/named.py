@@ -45,9 +45,7 @@ def resolve_policy(name: str, scenario: Scenario) -> Policy | System:
         return make_policy(name, scenario)
     path = find_policy(name)
     if path:
-        policy = load_policy(path)
-        policy.check_fits(scenario)
-        return policy
+        return load_policy(path).acting_on(scenario)
     source, separator, attribute = name.rpartition(":")
     if not separator:
         known = [*SCRIPTED, *shipped_policies()]

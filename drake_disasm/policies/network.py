@@ -4,15 +4,17 @@ import dataclasses
 import functools
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
-from drake_disasm.common.arrays import Array, array_like
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.mdp import ACTION_NAMES, STATE_NAMES
-from drake_disasm.policies.scripted import Admittance, Straight
+from drake_disasm.policies.scripted import make_policy, name_of
+from drake_disasm.policies.task_view import StageAxes, TaskView
 from drake_disasm.scenario import Scenario
+
+_WAY = "the way out"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -72,53 +74,6 @@ class _Memory:
         ]
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ActionMap:
-    """Maps an agent's output in [-1, 1] to an action, and back.
-
-    a = scale * chosen, plus the base policy's action where there is one: then the
-    agent only corrects a policy that works, by at most `action_scale` (bounded
-    residual; Johannink et al., 2019). Whoever asks the policy clips to the task's
-    bounds (`systems.policy.ask`).
-
-    Attributes:
-        action_scale: (6,) largest action or correction [m, rad]; 0 leaves an axis
-            to the base policy.
-        base: policy that is corrected, or None.
-    """
-
-    action_scale: np.ndarray
-    base: Straight | Admittance | None = None
-
-    def to_action(self, observation: Array, chosen: Array) -> Array:
-        """Returns the actions (..., 6) [m, rad] of choices (..., 6) in [-1, 1].
-
-        Args:
-            observation: (..., 12) the states, in SI units.
-            chosen: in [-1, 1].
-        """
-        scale = self.action_scale
-        if not isinstance(chosen, np.ndarray):
-            scale = array_like(scale, observation)
-        action = scale * chosen
-        return action if self.base is None else action + self.base(observation)
-
-    def from_action(self, observation: np.ndarray, action: np.ndarray) -> np.ndarray:
-        """Returns the choices (..., 6) float32 that come nearest to actions.
-
-        Args:
-            observation: (..., 12) the states, in SI units.
-            action: (..., 6) [m, rad].
-        """
-        if self.base is not None:
-            action = action - self.base(observation)
-        free = self.action_scale > 0.0
-        chosen = np.divide(
-            action, self.action_scale, out=np.zeros(action.shape), where=free
-        )
-        return np.clip(chosen, -1.0, 1.0).astype(np.float32)
-
-
 @dataclasses.dataclass(frozen=True)
 class PolicyDescription:
     """What a policy was trained for, and its provenance; the dicts as JSON has them.
@@ -158,18 +113,16 @@ class PolicyDescription:
 class LearnedPolicy:
     """A trained policy: observation (12,) to action (6,), in SI units.
 
-    action = action_map(tanh(network(observation / observation_scale)))
+    action = view.to_action(observation, tanh(network(view.observe(observation))))
 
     Attributes:
         network: (12,) to (6,), before the tanh.
-        observation_scale: (12,) what the state is divided by [m, rad, N, N m].
-        action_map: from the tanh's range to an action.
+        view: what the network sees of the task, and what its choices do there.
         description: what it was trained for.
     """
 
     network: Network
-    observation_scale: np.ndarray
-    action_map: ActionMap
+    view: TaskView
     description: PolicyDescription = dataclasses.field(
         default_factory=PolicyDescription
     )
@@ -180,25 +133,41 @@ class LearnedPolicy:
 
     def normalised(self, observation: np.ndarray) -> np.ndarray:
         """Returns the choice (6,) float32 in [-1, 1] for an observation (12,)."""
-        scaled = (observation / self.observation_scale).astype(np.float32)
-        return np.tanh(self.network(scaled))
+        return np.tanh(self.network(self.view.observe(observation).astype(np.float32)))
 
     def to_action(self, observation: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """Returns the action (6,) [m, rad] of a choice (6,) in [-1, 1]."""
-        return self.action_map.to_action(observation, chosen)
+        return self.view.to_action(observation, chosen)
+
+    def acting_on(self, scenario: Scenario) -> Self:
+        """Returns the policy for a scenario's part and arm.
+
+        One that sees and acts in a stage's axes gets those of the part, and a base
+        policy whose gains are for the arm.
+
+        Raises:
+            DisasmError: see `check_fits`.
+        """
+        self.check_fits(scenario)
+        view = self.view
+        if view.axes is None:
+            return self
+        base = view.base and make_policy(name_of(view.base), scenario)
+        view = dataclasses.replace(view, base=base, axes=StageAxes.of(scenario))
+        return dataclasses.replace(self, view=view)
 
     def check_fits(self, scenario: Scenario) -> None:
         """Refuses a task whose observations or actions differ from the policy's.
 
         Another part of the same way out, friction or effect is accepted: transfer to
-        those is the purpose.
-        So are wider bounds, which it does not use.
+        those is the purpose. So are wider bounds, which it does not use, and any way
+        out by a policy in a stage's axes.
 
         Raises:
             DisasmError: names what differs, and the remedy.
         """
         for name, then, now, fits in _compared(self.description, scenario):
-            if not fits:
+            if not fits and not (name == _WAY and self.view.axes):
                 remedy = f"set {name}={then}, or train anew"
                 raise DisasmError(
                     f"the policy was trained with {name} {then}, scenario "
@@ -216,7 +185,7 @@ def _compared(
         ("state", trained.state_names, STATE_NAMES),
         ("action", trained.action_names, ACTION_NAMES),
         ("observation.variant", trained.observation_variant, variant),
-        ("the way out", trained.way, scenario.part.way),
+        (_WAY, trained.way, scenario.part.way),
     ):
         yield name, then, now, then == now
     same = math.isclose(trained.period, task.period)

@@ -157,6 +157,20 @@ SCRIPTED: dict[str, type[Straight] | type[Admittance]] = {
 }
 
 
+def name_of(policy: Straight | Admittance) -> str:
+    """Returns the name of a scripted policy.
+
+    Raises:
+        DisasmError: it is none.
+    """
+    for name, kind in SCRIPTED.items():
+        if type(policy) is kind:
+            return name
+    raise DisasmError(
+        f"has the base {type(policy).__name__}; a file can name {', '.join(SCRIPTED)}"
+    )
+
+
 def make_policy(name: str, scenario: Scenario | None = None) -> Straight | Admittance:
     """Returns the scripted policy of a name.
 

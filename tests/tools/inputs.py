@@ -18,10 +18,10 @@ from drake_disasm.logs import (
 )
 from drake_disasm.mdp import Outcome
 from drake_disasm.policies import (
-    ActionMap,
     LearnedPolicy,
     Network,
     PolicyDescription,
+    TaskView,
     save_policy,
 )
 from drake_disasm.scenario import dump_scenario, load_scenario
@@ -92,7 +92,7 @@ def write_policy(path: Path, period: float = 0.1) -> None:
     )
     path.parent.mkdir(parents=True, exist_ok=True)
     save_policy(
-        path, LearnedPolicy(network, np.ones(12), ActionMap(np.ones(6)), description)
+        path, LearnedPolicy(network, TaskView(np.ones(12), np.ones(6)), description)
     )
 
 

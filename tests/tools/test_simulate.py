@@ -9,10 +9,10 @@ import pytest
 
 from drake_disasm.logs import read_log
 from drake_disasm.policies import (
-    ActionMap,
     LearnedPolicy,
     Network,
     Straight,
+    TaskView,
     save_policy,
 )
 from drake_disasm.scenario import load_scenario, scenario_from_mapping
@@ -66,8 +66,8 @@ def test_page_that_cannot_be_written_is_refused_before_the_run(
 def _trained(path: Path) -> Path:
     """Writes a policy that has learned to correct `straight` by nothing at all."""
     network = Network((np.zeros((6, 12), np.float32),), (np.zeros(6, np.float32),))
-    mapping = ActionMap(np.full(6, 1e-4), Straight())
-    save_policy(path, LearnedPolicy(network, np.ones(12), mapping))
+    view = TaskView(np.ones(12), np.full(6, 1e-4), Straight())
+    save_policy(path, LearnedPolicy(network, view))
     return path
 
 

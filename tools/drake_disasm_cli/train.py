@@ -43,6 +43,8 @@ _EXAMPLES = """examples:
       --out out/gpu
   drake-disasm train --agent sac --preset chapter4 --out out/sac \\
       --hyper layer_norm=true 'hidden=[64, 64]'
+  drake-disasm train --scenario removal --also iiwa_peg iiwa_bayonet \
+      --hyper axes=stage --out out/any_part           one policy for all three parts
   drake-disasm train --log out/chapter3/seed_000/log --scenario chapter3 \\
       --preset chapter3 --out out/offline                      without acting
   drake-disasm train --station cell --start-from out/first \\
@@ -54,6 +56,14 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Returns the parsed command line."""
     parser = program.argument_parser("drake-disasm train", __doc__, _EXAMPLES)
     common.add_scenario_arguments(parser)
+    parser.add_argument(
+        "--also",
+        nargs="+",
+        default=[],
+        metavar="NAME|FILE",
+        help="further scenarios that the same policy learns on, as many episodes each; "
+        "with other parts --hyper axes=stage is needed",
+    )
     _add_task_arguments(parser.add_argument)
     _add_batch_argument(parser.add_argument)
     _add_agent_arguments(parser.add_argument)
@@ -81,7 +91,8 @@ def _add_batch_argument(add: Callable[..., object]) -> None:
         type=options.positive,
         default=1,
         metavar="N",
-        help="episodes at a time, on a batch of twins with IMPACT contact; validation "
+        help="episodes at a time (of each scenario), on a batch of twins with IMPACT "
+        "contact; validation "
         "stays on the diagram of the scenario (default: 1, on the diagram). From "
         f"{MOST_RECORDED} on no log is written, only episodes.csv; updates_per_step "
         "then wants to be less than 1",
@@ -179,7 +190,7 @@ def _add_run_arguments(add: Callable[..., object]) -> None:
         type=options.positive,
         default=10,
         metavar="N",
-        help="greedy episodes after each training (default: 10)",
+        help="greedy episodes after each training, of each scenario (default: 10)",
     )
     add(
         "--threads",
@@ -222,6 +233,7 @@ def _experiment(args: argparse.Namespace, arguments: Sequence[str]) -> Experimen
         changes.append(f"episodes={args.episodes}")
     return Experiment(
         scenario=load_scenario(args.scenario, overrides),
+        others=tuple(load_scenario(name, overrides) for name in args.also),
         station=args.station,
         preset=args.preset,
         config=override(preset(args.preset, args.agent), changes),

@@ -10,7 +10,7 @@ from drake_disasm.learning.environments import make_environments
 from drake_disasm.learning.hyperparameters import preset
 from drake_disasm.learning.loop import TrainingLoop
 from drake_disasm.learning.replay import WIDTH, Replay
-from drake_disasm.learning.training import TrainingSpec, action_map, make_training
+from drake_disasm.learning.training import TrainingSpec, make_training, task_view
 from drake_disasm.logs import LogHeader, LogWriter, flat_columns, read_log
 from drake_disasm.logs.transitions import observations
 from drake_disasm.scenario import load_scenario
@@ -76,9 +76,9 @@ def test_a_log_teaches_what_was_lived_through(tmp_path: Path) -> None:
     memory = Replay(100)
     for episode in read_log(tmp_path / "log").episodes:
         actions, end = episode["action"][:-1], bool(episode["terminated"][-1])
-        chosen = action_map(SCENARIO, config)
+        chosen = task_view(SCENARIO, config)
         seen = observations(episode)
-        remember(memory, seen, actions, end, SCENARIO, chosen, config)
+        remember(memory, seen, actions, end, SCENARIO, chosen)
     lived, read = training.replay.contents()[0], memory.contents()[0]
     np.testing.assert_allclose(read, lived, atol=2e-5)
 
@@ -86,6 +86,6 @@ def test_a_log_teaches_what_was_lived_through(tmp_path: Path) -> None:
 def test_an_action_out_of_reach_is_cut_to_the_nearest() -> None:
     config, memory = preset("chapter3"), Replay(5)
     actions = np.array([[0.009, -0.009, 0.0015, 0, 0, 0]])
-    chosen = action_map(SCENARIO, config)
-    remember(memory, np.zeros((2, 12)), actions, False, SCENARIO, chosen, config)
+    chosen = task_view(SCENARIO, config)
+    remember(memory, np.zeros((2, 12)), actions, False, SCENARIO, chosen)
     np.testing.assert_allclose(memory.contents()[0][0, 12:15], [1.0, -1.0, 0.5])

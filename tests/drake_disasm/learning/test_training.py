@@ -27,12 +27,12 @@ from drake_disasm.learning.run import read_episodes
 from drake_disasm.learning.training import (
     Training,
     TrainingSpec,
-    action_map,
     make_training,
+    task_view,
 )
 from drake_disasm.logs import read_log
 from drake_disasm.mdp import action_bounds
-from drake_disasm.policies import Admittance, LearnedPolicy, make_policy
+from drake_disasm.policies import Admittance, LearnedPolicy, TaskView, make_policy
 from drake_disasm.scenario import load_scenario
 from drake_disasm.task.episode import EpisodeSummary
 from drake_disasm.task.simulation import TaskSimulation
@@ -78,11 +78,11 @@ def _assert_same_bits(one: Training, other: Training) -> None:
         np.testing.assert_array_equal(a, b)
 
 
-def _demonstrations(training_map: Any, config: Any) -> Replay:
+def _demonstrations(view: TaskView) -> Replay:
     memory = Replay(50)
     observations = np.random.default_rng(0).normal(size=(51, 12)) * 1e-3
     actions = np.zeros((50, 6))
-    remember(memory, observations, actions, True, SCENARIO, training_map, config)
+    remember(memory, observations, actions, True, SCENARIO, view)
     return memory
 
 
@@ -190,20 +190,20 @@ def test_a_residual_begins_as_its_base_policy_and_stays_near_it() -> None:
     bounds = action_bounds(SCENARIO.task)
     assert (np.abs(difference) < 0.01 * bounds).all()
     for sign in (-1.0, 1.0):
-        action = training.action_map.to_action(np.zeros(12), sign * np.ones(6))
+        action = training.view.to_action(np.zeros(12), sign * np.ones(6))
         assert (np.abs(action - base(np.zeros(12))) <= 0.1 * bounds + 1e-12).all()
 
 
 def test_corrections_are_as_long_whatever_the_bounds() -> None:
     for bound, limit in ((0.003, 9e-4), (0.001, 9e-4), (5e-4, 5e-4)):
         scenario = load_scenario("chapter3", [f"task.max_translation={bound}"])
-        scale = action_map(scenario, preset("best")).action_scale
+        scale = task_view(scenario, preset("best")).action_scale
         assert scale[1] == pytest.approx(limit)
 
 
 def test_demonstrations_fill_their_share_of_each_batch() -> None:
     plain = _training()
-    shown = _demonstrations(plain.action_map, plain.config)
+    shown = _demonstrations(plain.view)
     shown._rows[:, 18] = 77.0  # a reward that only demonstrations have
     training = _training(memories={"demonstrations": shown}, demonstrations=0.25)
     _run(training)
@@ -213,7 +213,7 @@ def test_demonstrations_fill_their_share_of_each_batch() -> None:
 
 def test_learning_from_a_dataset_alone_resumes_bit_for_bit(tmp_path: Path) -> None:
     plain = _training()
-    data = _demonstrations(plain.action_map, plain.config)
+    data = _demonstrations(plain.view)
     dataset = {"dataset": data, "updates": 22}
     whole, first, second = (_training(memories=dataset, episodes=4) for _ in range(3))
     loop = TrainingLoop(None, [whole])
@@ -273,5 +273,5 @@ def test_validation_does_not_disturb_the_training() -> None:
     for _ in range(2):
         _run(calm)
         _run(watched)
-        validate_policy(_policy(watched), SCENARIO, "twin", [1, 2])
+        validate_policy(_policy(watched), [SCENARIO], "twin", [1, 2])
     _assert_same_bits(calm, watched)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from drake_disasm.policies import (
-    ActionMap,
     LearnedPolicy,
     Network,
     PolicyDescription,
     Straight,
+    TaskView,
 )
 
 
@@ -33,8 +33,11 @@ def make_network() -> Callable[..., Network]:
 def policy() -> LearnedPolicy:
     return LearnedPolicy(
         random_network(12, 7, 5, 6),
-        np.repeat([0.01, 0.035, 5.0, 1.0], 3),
-        ActionMap(np.repeat([3e-4, 1.7e-3], 3), Straight(speed=0.0007)),
+        TaskView(
+            np.repeat([0.01, 0.035, 5.0, 1.0], 3),
+            np.repeat([3e-4, 1.7e-3], 3),
+            Straight(speed=0.0007),
+        ),
         PolicyDescription(
             agent="td3",
             preset="best",

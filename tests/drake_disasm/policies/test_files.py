@@ -14,9 +14,9 @@ from drake_disasm.common.archive import Arrays, pack, unpack
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.resources import models_dir
 from drake_disasm.policies import (
-    ActionMap,
     LearnedPolicy,
     Straight,
+    TaskView,
     find_policy,
     load_policy,
     save_policy,
@@ -36,9 +36,9 @@ def file(policy: LearnedPolicy, tmp_path: Path) -> Path:
 
 def _contents(policy: LearnedPolicy) -> list[Any]:
     arrays = (*policy.network.weights, *policy.network.biases)
-    arrays += (policy.observation_scale, policy.action_map.action_scale)
+    arrays += (policy.view.observation_scale, policy.view.action_scale)
     bits = [(a.dtype.str, a.shape, a.tobytes()) for a in arrays]
-    return [*bits, policy.action_map.base, policy.description]
+    return [*bits, policy.view.base, policy.view.axes, policy.description]
 
 
 def _refusal(path: Path) -> str:
@@ -52,8 +52,8 @@ def _refusal(path: Path) -> str:
     ("widths", "base"), [((12, 6), None), ((12, 128, 128, 128, 6), Straight())]
 )
 def test_round_trip_of_other_shapes(make_network, tmp_path, widths, base):
-    mapping = ActionMap(np.ones(6), base)
-    policy = LearnedPolicy(make_network(*widths), np.ones(12), mapping)
+    view = TaskView(np.ones(12), np.ones(6), base)
+    policy = LearnedPolicy(make_network(*widths), view)
     save_policy(tmp_path / "policy.npz", policy)
     assert _contents(load_policy(tmp_path / "policy.npz")) == _contents(policy)
 
@@ -87,7 +87,8 @@ def _put(**changes: Any) -> Callable[[Arrays, dict[str, Any]], Any]:
 
     def change(arrays: Arrays, text: dict[str, Any]) -> None:
         for name, value in made.items():
-            target = text if name in text else arrays
+            is_text = name in text or isinstance(value, dict)
+            target = text if is_text else arrays
             target[name] = value
 
     return change
@@ -120,6 +121,9 @@ BROKEN: list[tuple[Callable[[Arrays, dict[str, Any]], Any], str]] = [
     (_put(base={"name": "straight", "parameters": {"sped": 1.0}}), "'sped' 'speed'"),
     (_put(base={"name": "straight", "parameters": {"speed": "fast"}}), "speed 'fast'"),
     (_put(base="straight"), "base"),
+    (_put(axes={"way": "xy", "ends": [1.0], "switch": 1.0}), "way 'xy' axes"),
+    (_put(axes={"way": "x", "ends": [1e999], "switch": 1.0}), "axes end"),
+    (_put(axes={"way": "x"}), "'ends'"),
     (_drop("description"), "description"),
     (lambda a, t: t["description"].pop("period"), "description"),
     (lambda a, t: t["description"].update(period="0.1"), "description period float"),
@@ -141,10 +145,11 @@ def test_broken_policy_is_not_written(policy: LearnedPolicy, file: Path) -> None
     policy.network.biases[0][0] = np.nan
     with pytest.raises(DisasmError, match=r"not written.*NaN.*bias_0"):
         save_policy(file, policy)
-    strange = ActionMap(np.ones(6), lambda observation: np.zeros(6))  # type: ignore
+    nothing = lambda observation: np.zeros(6)  # noqa: E731
+    strange = dataclasses.replace(policy.view, base=nothing)
     policy.network.biases[0][0] = 0.0
     with pytest.raises(DisasmError, match="a file can name straight, admittance"):
-        save_policy(file, dataclasses.replace(policy, action_map=strange))
+        save_policy(file, dataclasses.replace(policy, view=strange))
     with pytest.raises(DisasmError, match=r"written; make the folder .*such"):
         save_policy(file.parent / "no/such/policy.npz", policy)
     assert file.read_bytes() == before

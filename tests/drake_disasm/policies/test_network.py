@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from drake_disasm.policies import (
-    ActionMap,
     Admittance,
     LearnedPolicy,
     Network,
     Straight,
+    TaskView,
     save_policy,
 )
 from drake_disasm.scenario import load_scenario
@@ -63,7 +63,7 @@ def test_network_remembers_nothing(make_network: MakeNetwork) -> None:
 @pytest.mark.parametrize("base", [None, Admittance()])
 def test_policy_is_its_formula(make_network, base):
     scale, reach = np.linspace(0.01, 5.0, 12), np.linspace(1e-4, 3e-3, 6)
-    policy = LearnedPolicy(make_network(12, 8, 6), scale, ActionMap(reach, base))
+    policy = LearnedPolicy(make_network(12, 8, 6), TaskView(scale, reach, base))
     for s in np.random.default_rng(2).normal(size=(5, 12)):
         chosen = np.tanh(policy.network((s / scale).astype(np.float32)))
         expected = reach * chosen + (0.0 if base is None else base(s))
@@ -76,7 +76,9 @@ def test_policy_is_its_formula(make_network, base):
 
 @pytest.mark.parametrize("base", [None, Admittance()])
 def test_choice_comes_back_from_its_action(base: Admittance | None) -> None:
-    mapping = ActionMap(np.array([1e-3, 2e-3, 1e-3, 0.01, 0.01, 0.02]), base)
+    mapping = TaskView(
+        np.ones(12), np.array([1e-3, 2e-3, 1e-3, 0.01, 0.01, 0.02]), base
+    )
     generator = np.random.default_rng(3)
     for _ in range(20):
         s, chosen = generator.normal(size=12), generator.uniform(-1, 1, 6)
@@ -84,9 +86,8 @@ def test_choice_comes_back_from_its_action(base: Admittance | None) -> None:
         assert back.dtype == np.float32
         np.testing.assert_allclose(back, chosen, atol=1e-6)
     # What is out of reach becomes the nearest choice.
-    mapping = ActionMap(
-        np.array([1e-3, 1e-3, 0.0, 0.1, 0.1, 0.1]), Straight(speed=1e-3)
-    )
+    reach = np.array([1e-3, 1e-3, 0.0, 0.1, 0.1, 0.1])
+    mapping = TaskView(np.ones(12), reach, Straight(speed=1e-3))
     choice = mapping.from_action(np.zeros(12), np.array([1.0, -1.0, 0.5, 0, 0.05, 0]))
     np.testing.assert_allclose(choice, [1, -1, 0, 0, 0.5, 0])
 

@@ -143,7 +143,8 @@ def test_another_policy_in_the_same_file_is_tried_anew(
     accept([str(file)], twin, draws=1, folder=kept)
     assert (kept / "results.jsonl").read_text() == before
     policy = load_policy(file)
-    save_policy(file, dataclasses.replace(policy, observation_scale=np.full(12, 2.0)))
+    view = dataclasses.replace(policy.view, observation_scale=np.full(12, 2.0))
+    save_policy(file, dataclasses.replace(policy, view=view))
     accept([str(file)], twin, draws=1, folder=kept)
     assert len((kept / "results.jsonl").read_text()) > len(before)
 
