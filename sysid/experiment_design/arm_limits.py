@@ -24,7 +24,7 @@ from sysid.models.arm_plant import weld_root
 
 Array = NDArray[np.float64]
 
-_POSTURES = 200  # random ones, to see which links overlap by their very models
+_POSTURES = 200  # random ones, to see which links are near by their very models
 _ALWAYS = 0.95  # share of the postures
 _NORM = 40  # p of the p-norm that stands for the greatest share
 _FAR = 1.0  # m: clearance that is reported if nothing is nearer
@@ -133,8 +133,8 @@ class CollisionFreeSpace:
     """Clearance of an arm's links from each other, and their height over a floor.
 
     By the collision geometry of its URDF, whatever pairs that filters; links that a
-    joint connects are left out, links that are fixed to each other, and pairs that
-    overlap in almost all postures: they do so by their models.
+    joint connects are left out, links that are fixed to each other, and pairs that are
+    nearer than the clearance in almost all postures: they are so by their models.
 
     Attributes:
         has_geometry: whether there is any, so that clearance means something.
@@ -143,9 +143,16 @@ class CollisionFreeSpace:
         urdf: a path, or `package://`; its root is welded to the world.
         joints: names of the joints, in the order of q.
         limits: of which random postures are drawn.
+        clearance: that links are to keep from each other [m].
     """
 
-    def __init__(self, urdf: str, joints: Sequence[str], limits: JointLimits) -> None:
+    def __init__(
+        self,
+        urdf: str,
+        joints: Sequence[str],
+        limits: JointLimits,
+        clearance: float = 0.0,
+    ) -> None:
         builder = DiagramBuilder()
         plant, self._scene = AddMultibodyPlantSceneGraph(builder, 0.0)
         instance = add_model(plant, urdf)
@@ -162,21 +169,21 @@ class CollisionFreeSpace:
         self._ignored: frozenset[tuple[GeometryId, GeometryId]] = frozenset()
         pairs = self._scene.model_inspector().GetCollisionCandidates()
         self.has_geometry = bool(pairs)
-        self._ignored = self._overlapping(limits)
+        self._ignored = self._always_near(limits, clearance)
 
-    def clearance(self, q: Array) -> Array:
+    def clearance(self, q: Array, most: float = _FAR) -> Array:
         """Returns the least distance [m] between links in postures (n, joints), (n,).
 
-        Negative where they overlap, 1 m where nothing is nearer.
+        Negative where they overlap, `most` where nothing is nearer.
         """
-        return np.array([self._distance(posture) for posture in q])
+        return np.array([self._distance(posture, most) for posture in q])
 
     def height(self, q: Array) -> Array:
         """Returns the least height [m] of a moving link's origin, (n,)."""
         return np.array([self._height(posture) for posture in q])
 
-    def _overlapping(
-        self, limits: JointLimits
+    def _always_near(
+        self, limits: JointLimits, clearance: float
     ) -> frozenset[tuple[GeometryId, GeometryId]]:
         if not self.has_geometry:
             return frozenset()
@@ -185,12 +192,14 @@ class CollisionFreeSpace:
         counts: dict[tuple[GeometryId, GeometryId], int] = {}
         for posture in random.uniform(limits.lower, limits.upper, size):
             self._set(posture)
-            for pair in self._query().ComputePointPairPenetration():
-                key = (pair.id_A, pair.id_B)
+            query = self._query()
+            near = query.ComputeSignedDistancePairwiseClosestPoints(clearance)
+            pairs = [*query.ComputePointPairPenetration(), *near]
+            for key in {(pair.id_A, pair.id_B) for pair in pairs}:
                 counts[key] = counts.get(key, 0) + 1
         return frozenset(k for k, n in counts.items() if n >= _ALWAYS * _POSTURES)
 
-    def _distance(self, posture: Array) -> float:
+    def _distance(self, posture: Array, most: float) -> float:
         self._set(posture)
         query = self._query()
         hits = [
@@ -200,13 +209,13 @@ class CollisionFreeSpace:
         ]
         if hits:
             return float(min(hits))
-        near = query.ComputeSignedDistancePairwiseClosestPoints(_FAR)
+        near = query.ComputeSignedDistancePairwiseClosestPoints(most)
         found = [
             pair.distance
             for pair in near
             if (pair.id_A, pair.id_B) not in self._ignored
         ]
-        return float(min(found, default=_FAR))
+        return float(min(found, default=most))
 
     def _height(self, posture: Array) -> float:
         self._set(posture)

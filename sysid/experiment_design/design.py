@@ -113,7 +113,7 @@ def design_motion(
         progress: gets each step; may raise to stop.
 
     Raises:
-        DisasmError: not even a small motion about any posture tried is allowed.
+        DisasmError: not even rest is allowed in any posture tried.
     """
     search = _Search(experiment, limits, workspace, settings)
     random = np.random.default_rng(settings.seed)
@@ -122,6 +122,11 @@ def design_motion(
         points.append(search.random_point(random))
         values.append(search.value(points[-1]))
         progress(ProgressUpdate("random motions", number + 1, settings.starts))
+    if not any(search.can_rest(point) for point in points):
+        raise DisasmError(
+            f"no motion: in {settings.starts} random postures the clearance, the floor "
+            "or a torque is violated even at rest; relax `clearance` or `floor`"
+        )
     best = points[int(np.argmin(values))]
     found = _improved(search, best, settings.iterations, progress)
     random_ones = [Figures.of(search.information(search.motion(p))) for p in points]
@@ -211,12 +216,17 @@ class _Search:
         rows = int(self._settings.duration * self._settings.rate)
         return self._experiment.information(columns, rows)
 
+    def can_rest(self, point: Array) -> bool:
+        """Returns whether rest at the centre of a point's motion is allowed."""
+        rest = self.motion(point).scaled(0.0).states(self._time[:1])
+        return not self._excess(*rest).any()
+
     def allowed(self, point: Array) -> FourierMotion:
         """Returns a point's motion, shrunk about its centre until all limits hold."""
         motion, low, high = self.motion(point), 0.0, 1.0
         if self._is_allowed(motion):
             return motion
-        if not self._is_allowed(motion.scaled(low)):
+        if not self.can_rest(point):
             raise DisasmError(
                 "no motion: even at rest in the best posture found a torque, the "
                 "clearance or the floor is violated; relax `clearance` or `floor`"
@@ -267,8 +277,8 @@ class _Search:
         torques = self._experiment.torques(q, v, vd)
         found = np.maximum(np.abs(torques) / self._limits.effort - 1.0, 0.0).sum(axis=1)
         if self._workspace.has_geometry:
-            near = settings.clearance - self._workspace.clearance(q)
-            found += np.maximum(near, 0.0)
+            least = settings.clearance
+            found += least - self._workspace.clearance(q, least)
         if settings.floor is not None:
             low = settings.floor - self._workspace.height(q)
             found += np.maximum(low, 0.0)

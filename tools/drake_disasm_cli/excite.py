@@ -161,7 +161,7 @@ def _design(args: argparse.Namespace, arguments: Sequence[str], urdf: str) -> No
     """Designs the motion of a URDF's arm, and writes it."""
     joints = tuple(args.joints or movable_joints(urdf))
     limits = JointLimits.of_urdf(urdf, joints, args.acceleration, args.margin)
-    workspace = CollisionFreeSpace(urdf, joints, limits)
+    workspace = CollisionFreeSpace(urdf, joints, limits, args.clearance)
     if not workspace.has_geometry:
         print("the URDF has no collision geometry: collisions are not looked for")
     noise = args.torque_noise * np.array(limits.effort)

@@ -94,3 +94,15 @@ def test_an_iiwa_that_folds_is_found_though_its_urdf_filters_that():
     folded = np.array([0.0, 2.09, 0.0, -2.09, 0.0, 2.09, 0.0])
     upright, close = workspace.clearance(np.stack([np.zeros(7), folded]))
     assert upright > close
+
+
+def test_links_that_are_always_near_leave_room_for_a_motion():
+    """A UR5e's first and third wrist are 18 mm apart in every posture."""
+    urdf = "package://disasm_models/ur5e/ur5e.urdf"
+    joints = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+    joints = tuple(f"{name}_joint" for name in joints)
+    limits = JointLimits.of_urdf(urdf, joints, 5.0, 0.1)
+    stretched = np.array([[0.0, -1.57, 0.0, -1.57, 0.0, 0.0]])
+    for clearance, is_near in ((0.0, True), (0.02, False)):
+        workspace = CollisionFreeSpace(urdf, joints, limits, clearance)
+        assert (workspace.clearance(stretched)[0] < 0.02) == is_near
