@@ -10,6 +10,7 @@ twin itself with IMPACT contact (200 transitions): where its stated error ends.
 
 import copy
 import math
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,7 @@ _EXAMPLES = """examples:
 def record(folder: Path, scenario: Scenario, kind: str, seed: int) -> Log:
     """Returns a log with what is hidden; one that is there already is read."""
     if not (folder / "done").exists():
+        shutil.rmtree(folder, ignore_errors=True)  # of a run that was stopped
         policy = Exploring(make_policy("admittance", scenario), _EXPLORATION, seed)
         station = "twin" if kind == "strong" else "cell"
         simulation = TaskSimulation(scenario, station, policy)

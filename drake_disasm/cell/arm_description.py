@@ -77,7 +77,7 @@ def per_joint(values: Sequence[float], joints: int, key: str) -> np.ndarray:
     if len(values) not in (1, joints):
         raise DisasmError(
             f"{key}: {len(values)} values given, and the arm has {joints} joints; give "
-            f"{joints}, or one for all"
+            f"{joints}, or [one] for all"
         )
     return np.full(joints, values[0]) if len(values) == 1 else np.array(values)
 

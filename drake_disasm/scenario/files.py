@@ -91,6 +91,7 @@ def with_hidden_effects(
     text = read_text(path, "give a scenario in YAML", MOST_BYTES)
     declared = dataclasses.replace(stated or nominal, effects=[])
     hidden = parse(upgraded(text), copy.deepcopy(declared), str(path))
+    _find_files(hidden, path.parent)
     for field in dataclasses.fields(Scenario):
         differs = getattr(hidden, field.name) != getattr(declared, field.name)
         if differs and field.name not in ("name", "effects"):
@@ -101,7 +102,6 @@ def with_hidden_effects(
             )
     if not hidden.effects:
         raise DisasmError(f"{path}: `hidden` has no effects; list some under `effects`")
-    _find_files(hidden, path.parent)
     real = dataclasses.replace(nominal, effects=[*nominal.effects, *hidden.effects])
     _checked(check, real, str(path))
     _checked(validate, real, str(path))
@@ -109,11 +109,14 @@ def with_hidden_effects(
 
 
 def _find_files(scenario: Scenario, folder: Path) -> None:
-    """Makes the files that effects and the part name those beside a scenario."""
-    for name in scenario.part.file_fields:
-        file = getattr(scenario.part, name)
+    """Makes the files that a scenario names those beside it."""
+    part = scenario.part
+    devices: list[Any] = [scenario.arm, scenario.gripper, scenario.ft_sensor]
+    named = [(device, "model") for device in devices]
+    for section, name in named + [(part, name) for name in part.file_fields]:
+        file = getattr(section, name)
         if file and not file.startswith("package:"):
-            setattr(scenario.part, name, str((folder / file).absolute()))
+            setattr(section, name, str((folder / file).absolute()))
     for effect in scenario.effects:
         for field, file in files_of(effect).items():
             setattr(effect, field, str((folder / file).absolute()))

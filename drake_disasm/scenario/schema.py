@@ -76,7 +76,9 @@ class ArmConfig:
     """
 
     model: str = quantity(
-        "package://disasm_models/iiwa14/iiwa14.urdf", "", "URDF of the arm"
+        "package://disasm_models/iiwa14/iiwa14.urdf",
+        "",
+        "URDF of the arm, a path from the scenario's folder or package://",
     )
     name: str = quantity("iiwa", "", "of the device, in `<name>.position` and the like")
     base: str = quantity("iiwa_link_0", "", "link that stands on the world's origin")

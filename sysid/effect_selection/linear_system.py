@@ -18,7 +18,7 @@ from sysid.fitting.candidates import Candidate, extended, joint_groups
 from sysid.fitting.fit import Fit
 from sysid.fitting.fitter import Fitter
 from sysid.fitting.settings import SelectionSettings
-from sysid.identification.linearisation import Linearisation, extend
+from sysid.identification.linearisation import Linearisation
 from sysid.models.base import LogModel
 from sysid.models.effects import field_of
 from sysid.parameters import Parameter, nominal_values
@@ -158,7 +158,7 @@ def _linearised(
     objective = fitter.objective(model)
     rest = nominal_values(model.parameters)[len(fit.theta) :]
     u = objective.scaling.to_unit(np.concatenate([fit.theta, rest]))
-    found = extend(fit.linearisation, objective, u, deadline=deadline)
+    found = fitter.extended(fit.linearisation, objective, u, deadline)
     if len(found.u) < len(u):
         count = sum(group.stop <= len(found.u) for group in groups)
         model, groups = extended(fit.model, library[:count])

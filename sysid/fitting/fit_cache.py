@@ -1,8 +1,8 @@
-"""A cache of fits on disk, so that a search that was stopped can resume.
+"""A cache on disk, so that a search that was stopped can resume.
 
 A search is deterministic: started again with the same log, scenario and library it
-asks for the same fits, and cached ones cost nothing. The key of a fit is a hash of all
-that it depends on.
+asks for the same fits and derivatives, and cached ones cost nothing. The key is a hash
+of all that they depend on.
 """
 
 import hashlib
@@ -12,6 +12,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from drake_disasm.common.finished_work import Arrays, FinishedWork
 from sysid.identification.linearisation import Linearisation
@@ -44,7 +47,6 @@ def cached_fit(
     """
     if folder is None:
         return find()
-    key = hashlib.sha256(pickle.dumps(depends_on)).hexdigest()
 
     def _whole() -> Arrays:
         found = find()
@@ -53,11 +55,31 @@ def cached_fit(
         return _arrays(found)
 
     try:
-        kept = FinishedWork(folder).arrays(key, _whole)
+        kept = FinishedWork(folder).arrays(_key(depends_on), _whole)
     except _UnfinishedError as unfinished:
         return unfinished.fit
     arrays = {name: kept[name] for name in _ARRAYS}
     return Linearisation(**arrays, huber_delta=float(kept["huber_delta"]))
+
+
+def cached_array(
+    folder: Path | None, depends_on: Any, find: Callable[[], NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Returns an array from the cache, or computes and caches it.
+
+    Args:
+        folder: of the cache; None for no cache.
+        depends_on: everything that the array depends on.
+        find: computes it.
+    """
+    if folder is None:
+        return find()
+    work = FinishedWork(folder)
+    return work.arrays(_key(depends_on), lambda: {"array": find()})["array"]
+
+
+def _key(depends_on: Any) -> str:
+    return hashlib.sha256(pickle.dumps(depends_on)).hexdigest()
 
 
 def _arrays(fit: Linearisation) -> Arrays:

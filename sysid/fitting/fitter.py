@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from sysid.fitting.candidates import Candidate, extended
 from sysid.fitting.fit import Fit
-from sysid.fitting.fit_cache import cached_fit
+from sysid.fitting.fit_cache import cached_array, cached_fit
 from sysid.fitting.settings import SelectionSettings
 from sysid.identification.gauss_newton import gauss_newton
-from sysid.identification.linearisation import Linearisation
+from sysid.identification.linearisation import Linearisation, extend
 from sysid.identification.noise import with_estimated_noise
 from sysid.models.base import LogModel
 from sysid.objective import Objective
@@ -182,6 +182,28 @@ class Fitter:
             self.settings,
             self.noise_is_stated,
         )
+
+    def extended(
+        self, known: Linearisation, objective: Objective, u: Array, deadline: float
+    ) -> Linearisation:
+        """Returns a linearisation with more parameters, as many as there is time for.
+
+        Args:
+            known: with the first parameters.
+            objective: of all.
+            u: (p,) the point, in the unit box.
+            deadline: by `time.monotonic` [s], see `extend`.
+        """
+        model, folder = objective.model, self.folder
+        if model.affine or folder is None:
+            return extend(known, objective, u, deadline=deadline)
+
+        def kept(thetas: Array, find: Callable[[], list[Array]]) -> list[Array]:
+            """Returns residuals at points, which a run that was stopped may have."""
+            on = (model, self.exact, thetas)
+            return list(cached_array(folder, on, lambda: np.stack(find())))
+
+        return extend(known, objective, u, deadline=deadline, kept=kept)
 
     def with_exact_derivatives(self) -> "Fitter":
         """Returns a fitter that uses the model's own derivatives."""

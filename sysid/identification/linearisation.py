@@ -1,8 +1,9 @@
 """The objective's residuals and their derivatives at a point."""
 
 import dataclasses
+import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,10 @@ WIDE_STEP = 0.03
 _NOTICEABLE = 3.0  # standard deviations that a step should move the residuals by
 _SAME = 1e-6  # of a derivative: rounding of differences
 _BETWEEN_LOOKS = 8  # evaluations, or as many as a model takes together
+
+
+#: Returns what a function finds at points (k, p), or what is kept of it.
+Kept = Callable[[Array, Callable[[], list[Array]]], list[Array]]
 
 
 @dataclass(frozen=True)
@@ -140,6 +145,7 @@ def extend(
     u: Array,
     steps: Array | None = None,
     deadline: float = math.inf,
+    kept: Kept | None = None,
 ) -> Linearisation:
     """Returns a linearisation with more parameters, one evaluation for each.
 
@@ -151,6 +157,8 @@ def extend(
             that is nearer.
         deadline: by `time.monotonic` [s]: parameters whose turn comes later are left
             out; the first few never are.
+        kept: gets points (k, p) and what finds the residuals there, some at a time;
+            returns them, and may have kept them of a run that was stopped.
     """
     known = len(linearisation.u)
     if steps is None:
@@ -167,9 +175,10 @@ def extend(
     jacobian[..., :known] = linearisation.jacobian
     done = known
     size = max(_BETWEEN_LOOKS, source.model.together)
-    for part in parts_until(deadline, len(points), size):
-        together = np.vstack([points[part], at_origin])
-        found = list(source.residuals(objective.scaling.from_unit(together)))
+    for part in parts_until(deadline, len(points), size, is_whole=kept is None):
+        thetas = objective.scaling.from_unit(np.vstack([points[part], at_origin]))
+        find = functools.partial(source.residuals, thetas)
+        found = kept(thetas, find) if kept else find()
         if len(at_origin):
             origin = found.pop()
         for residual in found:

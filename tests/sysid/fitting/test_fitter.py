@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from sysid.fitting.fitter import Fitter
 from sysid.fitting.settings import DEFAULT_SETTINGS
+from sysid.identification.linearisation import linearise
 from sysid.models.base import Array, LogModel
 from sysid.models.measurements import Channel, Measurements
 from sysid.parameters import Parameter
@@ -50,3 +51,44 @@ def test_what_a_model_does_not_react_to_is_one_fit():
 def test_where_the_begin_overshoots_the_way_is_halved():
     """Taken in full, each way would be 1.5 times as far as the last, and back."""
     np.testing.assert_allclose(_fitted(1.5, 1.0), 0.4, atol=0.06)
+
+
+class _Counted(LogModel):
+    """y = sum of squares of twenty parameters; counts the predictions of all."""
+
+    predictions = 0
+    costly = True
+
+    def __init__(self) -> None:
+        self.parameters = tuple(
+            Parameter(f"a{i}", 0.5, -1.0, 1.0, "N") for i in range(20)
+        )
+        channels = [Channel("y", "N", noise=0.01)]
+        self.measurements = Measurements.of_array(np.ones(5), channels)
+
+    def predict(self, theta: Array, rows: slice) -> Array:
+        _Counted.predictions += 1
+        return np.full(5, float(theta @ theta))[rows]
+
+    def select_rows(self, mask: NDArray[np.bool_]) -> Self:
+        return self
+
+
+def test_derivatives_that_a_run_has_found_are_there_for_the_next(tmp_path):
+    fitter = Fitter.of(
+        _Counted(), Workers(), np.inf, DEFAULT_SETTINGS, tmp_path / "fits"
+    )
+    objective = fitter.objective(fitter.base)
+    known = linearise(objective, objective.start).of_first(0)
+    _Counted.predictions = 0
+    begun = fitter.extended(known, objective, objective.start, deadline=0.0)
+    made, columns = _Counted.predictions, begun.jacobian.shape[-1]
+    assert made > 0 and columns < 20
+    whole = fitter.extended(known, objective, objective.start, deadline=np.inf)
+    rest = -(-20 // columns) - 1  # parts, each of which may ask for the origin, too
+    assert _Counted.predictions - made <= 20 - columns + rest
+    again = fitter.extended(known, objective, objective.start, deadline=np.inf)
+    assert _Counted.predictions - made <= 20 - columns + rest
+    np.testing.assert_array_equal(again.jacobian, whole.jacobian)
+    np.testing.assert_array_equal(begun.jacobian, whole.jacobian[..., :columns])
+    np.testing.assert_allclose(whole.jacobian[0, 0], 100.0 * 2.0, rtol=0.01)
