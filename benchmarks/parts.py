@@ -187,7 +187,8 @@ def learning_rows(files: Sequence[Path]) -> Iterator[tuple[Cell, ...]]:
     for row in rows:
         path = Path(row["policy"])  # TRAINING/seed_000/policy.npz
         name = path.parts[-3] if len(path.parts) > 2 else path.name
-        groups.setdefault((row["scenario"], row["station"], name), []).append(row)
+        scenario = Path(row["scenario"]).stem
+        groups.setdefault((scenario, row["station"], name), []).append(row)
     for key, own in groups.items():
         right, count = (sum(r[name] for r in own) for name in ("successes", "episodes"))
         low, high = (f"{100 * end:.0f}" for end in wilson_interval(right, count))

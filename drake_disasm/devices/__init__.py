@@ -1,1 +1,1 @@
-"""Devices of the station, simulated; the real ones' protocols join them later."""
+"""Devices of the stations: simulated ones, protocols of the real ones, and fakes."""

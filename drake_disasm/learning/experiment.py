@@ -112,8 +112,8 @@ class Experiment:
         ways = {scenario.part.way for scenario in (self.scenario, *self.others)}
         if len(ways) > 1 and self.config.axes != "stage":
             raise DisasmError(
-                f"also: parts that leave by {' and '.join(sorted(ways))} look alike in "
-                "the axes of their stages only; give the hyper-parameter axes=stage"
+                f"also: parts that leave by {' and '.join(sorted(ways))} need one view "
+                "of their stages; give the hyper-parameter axes=stage"
             )
         for other in self.others:
             if other.task.period != self.scenario.task.period:
