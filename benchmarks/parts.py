@@ -256,7 +256,7 @@ def main(arguments: Sequence[str]) -> int:
     """Prints a table; returns the exit status."""
     args = parse(arguments)
     if args.table == "learning":
-        table = _Table(_LEARNING, _LEARNING_COLUMNS, lambda: learning_rows(args.files))
+        table = _Table(args.title, _LEARNING_COLUMNS, lambda: learning_rows(args.files))
     else:
         table = TABLES[args.table]
     rows: Rows = list(table.rows())
@@ -272,6 +272,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("table", choices=names, help=f"one of {', '.join(names)}")
     parser.add_argument(
         "files", nargs="*", type=Path, help="with learning: evaluations"
+    )
+    parser.add_argument(
+        "--title", default=_LEARNING, help="of the table of evaluations"
     )
     add_results_argument(parser)
     return parser.parse_args(arguments)
