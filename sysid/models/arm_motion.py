@@ -113,7 +113,7 @@ class ArmMotion:
             np.concatenate([e[name] for e in episodes])
             for name in ("q", "v", "vd", "time")
         )
-        Y, Y_tilt = arm.regressor(q, v, vd), arm.tilt_regressor(q)
+        Y, Y_tilt = arm.with_tilt(q, v, vd)
         counts = [len(e["time"]) for e in episodes]
         episode = np.repeat(np.arange(len(episodes)), counts)
         return cls(

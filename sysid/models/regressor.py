@@ -92,27 +92,29 @@ class ArmRegressor:
 
     def regressor(self, q: Array, v: Array, vd: Array) -> Array:
         """Returns Y (n, joints, parameters) of states (n, joints)."""
-        links = self._links(q, v, vd)
-        return self._stacked(
-            [k.to_joints(body_regressor(k.w, k.alpha, k.a)) for k in links]
-        )
+        return self._regressor(self._links(q, v, vd))
 
-    def tilt_regressor(self, q: Array) -> Array:
-        """Returns dY (n, joints, parameters, 2) by a tilt [rx, ry] of the base.
+    def with_tilt(self, q: Array, v: Array, vd: Array) -> tuple[Array, Array]:
+        """Returns Y, and dY (n, joints, parameters, 2) by a tilt [rx, ry] of the base.
 
         By the gravity that the base then sees, which is linear in Y: turned by w, it
         sees g - w x g.
         """
-        zero = np.zeros_like(q)
-        links = self._links(q, zero, zero)
+        links = self._links(q, v, vd)
         changes = -np.cross(np.eye(3)[:2], self._plant.gravity_field().gravity_vector())
         parts = []
         for dg in changes:
-            blocks = [
-                k.to_joints(body_regressor(k.w, k.alpha, -dg @ k.R_WB)) for k in links
-            ]
+            blocks = []
+            for k in links:
+                rest = np.zeros_like(k.w)
+                blocks.append(k.to_joints(body_regressor(rest, rest, -dg @ k.R_WB)))
             parts.append(self._stacked(blocks))
-        return np.stack(parts, axis=-1)
+        return self._regressor(links), np.stack(parts, axis=-1)
+
+    def _regressor(self, links: "Sequence[_LinkMotion]") -> Array:
+        return self._stacked(
+            [k.to_joints(body_regressor(k.w, k.alpha, k.a)) for k in links]
+        )
 
     def torques(self, q: Array, v: Array, vd: Array) -> Array:
         """Returns the torques (n, joints) by the URDF of states (n, joints).

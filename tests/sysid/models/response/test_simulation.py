@@ -175,13 +175,11 @@ def test_a_payload_takes_what_the_regressor_says(tmp_path):
     payload = FlangePayload(0.7, 0.02, -0.03, 0.1)
     tilt = ArmTilt(0.02, -0.05)
     q, v, vd = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 20, 2))
-    Y = dynamics.regressor(q, v, vd)
+    Y, Y_tilt = dynamics.with_tilt(q, v, vd)
     by_payload = Y[:, :, dynamics.last_link] @ payload.inertial
     found = arm.bodies.terms(q, v, [payload]).load(vd)
     np.testing.assert_allclose(found, Y @ dynamics.inertia + by_payload, atol=1e-9)
-    by_tilt = np.einsum(
-        "njkt,k,t->nj", dynamics.tilt_regressor(q), dynamics.inertia, [tilt.rx, tilt.ry]
-    )
+    by_tilt = np.einsum("njkt,k,t->nj", Y_tilt, dynamics.inertia, [tilt.rx, tilt.ry])
     found = arm.bodies.terms(q, v, [tilt]).load(vd)
     np.testing.assert_allclose(found, Y @ dynamics.inertia + by_tilt, atol=1e-9)
 
