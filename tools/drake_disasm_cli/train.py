@@ -43,7 +43,7 @@ _EXAMPLES = """examples:
       --out out/gpu
   drake-disasm train --agent sac --preset chapter4 --out out/sac \\
       --hyper layer_norm=true 'hidden=[64, 64]'
-  drake-disasm train --scenario removal --also iiwa_peg iiwa_bayonet \
+  drake-disasm train --scenario removal --also iiwa_peg iiwa_bayonet \\
       --hyper axes=stage --out out/any_part           one policy for all three parts
   drake-disasm train --log out/chapter3/seed_000/log --scenario chapter3 \\
       --preset chapter3 --out out/offline                      without acting

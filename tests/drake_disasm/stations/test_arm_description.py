@@ -158,7 +158,7 @@ def test_what_a_model_lacks_is_named_with_the_remedy(kind: str, tmp_path: Path) 
     ({"joints": ["iiwa_joint_2", "iiwa_joint_1"]},
      ["arm.joints", "[iiwa_joint_1, iiwa_joint_2]"]),
     ({"joints": [f"iiwa_joint_{i}" for i in range(1, 6)]}, ["5 driven", "6 or more"]),
-    ({"posture": [0.1] * 6}, ["arm.posture", "6 values", "7 joints", "one for all"]),
+    ({"posture": [0.1] * 6}, ["arm.posture", "6 values", "7 joints", "[one] for all"]),
     ({"stiffness": []}, ["arm.stiffness", "0 values", "7 joints"]),
     ({"base": "finger", "flange": "iiwa_link_0"}, ["arm.flange", "'finger'"]),
 ])  # fmt: skip
