@@ -200,12 +200,13 @@ class JoinedRows:
         self._seen: list[Array] = [None] * len(self._parts)
 
     def begin(self, rows: np.ndarray, seeds: Sequence[int]) -> Array:
-        """Begins episodes in those of the tasks that have such rows."""
+        """Begins episodes in tasks that have such rows; at first in all."""
         seed_of = dict(zip(rows.tolist(), seeds, strict=True))
         for number, (own, environments) in enumerate(self._parts):
-            new = np.flatnonzero(np.isin(own, rows))
+            is_first = self._seen[number] is None
+            new = np.flatnonzero(np.isin(own, rows) | is_first)
             if len(new):
-                own_seeds = [seed_of[row] for row in own[new].tolist()]
+                own_seeds = [seed_of.get(row, 0) for row in own[new].tolist()]
                 self._seen[number] = environments.begin(new, own_seeds)
         return self._joined(self._seen)
 

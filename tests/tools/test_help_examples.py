@@ -36,9 +36,9 @@ _SMALL = {
     "excite": ("--iterations=1", "--duration=4"),
     "play-motion": ("--no-meshcat",),
 }
-#: Examples that need a cluster or devices; some programs run until they are stopped.
+#: Examples that need a cluster, a GPU or devices; some programs run until stopped.
 _ELSEWHERE = re.compile(
-    r"--executor dask|--station hardware|^drake-disasm fake-cell|--follow"
+    r"--executor dask|--device cuda|--station hardware|^drake-disasm fake-cell|--follow"
 )
 _QUICK = ("plot-training", "accept")
 #: A study's own factors, at one level each.
@@ -80,7 +80,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("out/arm_1", "out/arm_2"):
         write_slide_log(tmp_path / name)
     write_readings(tmp_path / "out/readings")
-    write_trainings(tmp_path / "out/td3", tmp_path / "out/sac")
     columns = slide_motion()
     recorded = {name: columns[name] for name in ("time", "q", "tau")}
     np.savez(tmp_path / "run.npz", **recorded)
@@ -132,6 +131,8 @@ def test_examples_are_accepted(name: str) -> None:
     ],
 )
 def test_examples_run(name: str, folder: Path) -> None:
+    if name == "plot-training":
+        write_trainings(folder / "out/td3", folder / "out/sac")
     if name == "accept":
         write_closed(folder / "out/closed", gain=0.0)
     if name in ("accept", "evaluate"):

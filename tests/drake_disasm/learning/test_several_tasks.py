@@ -77,6 +77,19 @@ def test_an_agent_remembers_as_many_episodes_of_each(envs: int) -> None:
     np.testing.assert_allclose(left[:, envs:], BAYONET.part.stages[0].end, atol=0.05)
 
 
+@pytest.mark.parametrize("episodes", [1, 3])
+def test_a_last_round_may_leave_tasks_out(episodes: int) -> None:
+    spec = _spec(PEG, BAYONET)
+    config = dataclasses.replace(spec.config, episodes=episodes)
+    spec = dataclasses.replace(spec, config=config)
+    training = make_training(spec)
+    loop = TrainingLoop(make_environments([spec]), [training])
+    while loop.unfinished:
+        loop.run_round()
+    assert len(training.summaries) == episodes
+    assert training.replay.size == 3 * episodes
+
+
 def test_seeds_train_side_by_side_and_are_validated_on_each_task(
     tmp_path: Path,
 ) -> None:
