@@ -42,9 +42,8 @@ class Step(BatchResult):
             steps: of the environments.
             order: (n,) which of their rows, one after another, each row is.
         """
-        xp = namespace(steps[0].seen)
         terms = {
-            name: xp.concat([step.reward_terms[name] for step in steps])[order]
+            name: _in_order([step.reward_terms[name] for step in steps], order)
             for name in steps[0].reward_terms
         }
         failure = [why for step in steps for why in step.failure]
@@ -53,7 +52,7 @@ class Step(BatchResult):
             reward_terms=terms,
             failure=[failure[row] for row in order],
             **{
-                name: xp.concat([getattr(step, name) for step in steps])[order]
+                name: _in_order([getattr(step, name) for step in steps], order)
                 for name in others
             },
         )
@@ -208,7 +207,7 @@ class JoinedRows:
             if len(new):
                 own_seeds = [seed_of.get(row, 0) for row in own[new].tolist()]
                 self._seen[number] = environments.begin(new, own_seeds)
-        return self._joined(self._seen)
+        return _in_order(self._seen, self._order)
 
     def step(self, actions: Array) -> Step:
         """Steps all tasks."""
@@ -218,7 +217,8 @@ class JoinedRows:
 
     def bolt_is_out(self) -> Array:
         """Asks all tasks."""
-        return self._joined([each.bolt_is_out() for _, each in self._parts])
+        is_out = [each.bolt_is_out() for _, each in self._parts]
+        return _in_order(is_out, self._order)
 
     def recorded(self, row: int, steps: int) -> Columns | None:
         """Asks the task whose row it is."""
@@ -228,8 +228,10 @@ class JoinedRows:
                 return environments.recorded(own, steps)
         return None
 
-    def _joined(self, values: Sequence[Array]) -> Array:
-        return namespace(values[0]).concat(list(values))[self._order]
+
+def _in_order(parts: Sequence[Array], order: np.ndarray) -> Array:
+    """Returns the rows of several arrays, one after another, in another order."""
+    return namespace(parts[0]).concat(list(parts))[order]
 
 
 class GymnasiumRows:

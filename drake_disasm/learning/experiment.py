@@ -125,8 +125,9 @@ class Experiment:
     @property
     def is_recorded(self) -> bool:
         """Whether each episode's rows go into a log; of many they would fill a disk."""
-        has_log = not self.logs and not self.others  # which has one scenario
-        return has_log and self.envs < MOST_RECORDED
+        if self.logs or self.others:  # a log has one scenario
+            return False
+        return self.envs < MOST_RECORDED
 
     @property
     def is_batched(self) -> bool:

@@ -127,7 +127,10 @@ class Training:
             )
         self.agent, self.config, self.seed, self.device = agent, config, seed, device
         self.replay = dataset or Replay(config.replay, *sizes, device)
-        self.view = view or TaskView(np.ones(sizes[0]), np.ones(sizes[1]))
+        view = view or TaskView(np.ones(sizes[0]), np.ones(sizes[1]))
+        if isinstance(view, TaskView):
+            _refuse_other_sizes(view, sizes)
+        self.view = view.placed(self.placed)
         self.summaries: list[EpisodeSummary] = []
         self.rounds = 0
         self.seconds = {"simulation": 0.0, "updates": 0.0, "saving": 0.0}
@@ -238,6 +241,15 @@ class Training:
         if self.device == "numpy":
             return np.random.default_rng(seed)
         return TensorRandom(seed, self.device)
+
+
+def _refuse_other_sizes(view: TaskView, sizes: tuple[int, int]) -> None:
+    found = np.size(view.observation_scale), np.size(view.action_scale)
+    if found != sizes:
+        raise DisasmError(
+            f"view: has scales of {found[0]} and {found[1]} numbers, not of "
+            f"{sizes[0]} and {sizes[1]}"
+        )
 
 
 def make_training(

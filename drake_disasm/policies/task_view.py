@@ -1,8 +1,8 @@
 """What an agent sees of a task, and what its choices do there."""
 
 import dataclasses
-from collections.abc import Sequence
-from typing import Any, Self
+from collections.abc import Callable, Sequence
+from typing import Self
 
 import numpy as np
 
@@ -40,33 +40,38 @@ class StageAxes:
 
     def observe(self, state: Array) -> Array:
         """Returns states (..., 12) in these axes, with what is left of the stage."""
-        return self._by_stage(state, self._seen)
+        seen = [self._left(state, axis, end) for axis, end in self._stages]
+        return self._of_stage(state, seen)
 
     def to_groove(self, state: Array, action: Array) -> Array:
         """Returns actions (..., 6) in these axes as actions in the groove's."""
-        return self._by_stage(state, lambda _, axis, end: _rolled(action, axis))
+        return self._of_stage(
+            state, [_rolled(action, axis) for axis, _ in self._stages]
+        )
 
     def from_groove(self, state: Array, action: Array) -> Array:
         """Returns actions (..., 6) in the groove's axes as actions in these."""
-        return self._by_stage(state, lambda _, axis, end: _rolled(action, -axis))
+        return self._of_stage(
+            state, [_rolled(action, -axis) for axis, _ in self._stages]
+        )
+
+    @property
+    def _stages(self) -> list[tuple[int, float]]:
+        """Axis and end of each stage."""
+        return list(zip(map(AXES.index, self.way), self.ends, strict=True))
 
     @staticmethod
-    def _seen(state: Array, axis: int, end: float) -> Array:
+    def _left(state: Array, axis: int, end: float) -> Array:
         seen = _rolled(state, -axis)
         first = 3 * (axis // 3)  # of the rotations, or of the positions
         seen[..., first] = end - seen[..., first]
         return seen
 
-    def _by_stage(self, state: Array, function: Any) -> Array:
-        """Returns what a function of state, axis and end gives for the stage."""
-        axes = [AXES.index(letter) for letter in self.way]
-        values = [
-            function(state, axis, end)
-            for axis, end in zip(axes, self.ends, strict=True)
-        ]
-        is_last = state[..., axes[0]] > self.switch
+    def _of_stage(self, state: Array, values: Sequence[Array]) -> Array:
+        """Returns those of the values, one for each stage, of the stage that is on."""
         if len(values) == 1:
             return values[0]
+        is_last = state[..., AXES.index(self.way[0])] > self.switch
         return namespace(state).where(is_last[..., None], values[1], values[0])
 
 
@@ -95,10 +100,17 @@ class TaskView:
         axes: in which the agent sees and acts; None: those of the groove.
     """
 
-    observation_scale: np.ndarray
-    action_scale: np.ndarray
+    observation_scale: Array
+    action_scale: Array
     base: Straight | Admittance | None = None
     axes: StageAxes | None = None
+
+    def placed(self, place: Callable[[np.ndarray], Array]) -> Self:
+        """Returns the view with its scales where tensors are, once for all steps."""
+        scales = place(self.observation_scale), place(self.action_scale)
+        return dataclasses.replace(
+            self, observation_scale=scales[0], action_scale=scales[1]
+        )
 
     def observe(self, observation: Array) -> Array:
         """Returns what the agent sees (..., s) of states (..., s) in SI units."""
@@ -112,7 +124,7 @@ class TaskView:
             observation: (..., 12) the states, in SI units.
             chosen: in [-1, 1].
         """
-        action = _like(self.action_scale, chosen) * chosen
+        action = _like(self.action_scale, observation) * chosen
         if self.axes is not None:
             action = self.axes.to_groove(observation, action)
         return action if self.base is None else action + self.base(observation)
@@ -146,6 +158,10 @@ class TaskViews:
     def __init__(self, views: Sequence[TaskView], rows: int) -> None:
         self._views, self._rows = list(views), rows
 
+    def placed(self, place: Callable[[np.ndarray], Array]) -> "TaskViews":
+        """Returns the same of views that are placed; see `TaskView`."""
+        return TaskViews([view.placed(place) for view in self._views], self._rows)
+
     def observe(self, observation: Array) -> Array:
         """Returns what the agent sees (n, s) of states (n, s); see `TaskView`."""
         return self._joined(
@@ -159,7 +175,9 @@ class TaskViews:
             observation,
         )
 
-    def _joined(self, function: Any, observation: Array) -> Array:
+    def _joined(
+        self, function: Callable[[TaskView, slice], Array], observation: Array
+    ) -> Array:
         """Returns the rows that a function of view and rows gives."""
         count, size = len(observation), self._rows
         slices = [slice(first, first + size) for first in range(0, count, size)]
@@ -168,5 +186,5 @@ class TaskViews:
         )
 
 
-def _like(values: np.ndarray, array: Array) -> Array:
+def _like(values: Array, array: Array) -> Array:
     return values if isinstance(array, np.ndarray) else array_like(values, array)

@@ -63,17 +63,15 @@ def cached_fit(
 
 
 def cached_array(
-    folder: Path | None, depends_on: Any, find: Callable[[], NDArray[np.float64]]
+    folder: Path, depends_on: Any, find: Callable[[], NDArray[np.float64]]
 ) -> NDArray[np.float64]:
     """Returns an array from the cache, or computes and caches it.
 
     Args:
-        folder: of the cache; None for no cache.
+        folder: of the cache.
         depends_on: everything that the array depends on.
         find: computes it.
     """
-    if folder is None:
-        return find()
     work = FinishedWork(folder)
     return work.arrays(_key(depends_on), lambda: {"array": find()})["array"]
 

@@ -188,6 +188,8 @@ class Fitter:
     ) -> Linearisation:
         """Returns a linearisation with more parameters, as many as there is time for.
 
+        Of a model that takes long the derivatives are cached, as fits are.
+
         Args:
             known: with the first parameters.
             objective: of all.
@@ -195,7 +197,7 @@ class Fitter:
             deadline: by `time.monotonic` [s], see `extend`.
         """
         model, folder = objective.model, self.folder
-        if model.affine or folder is None:
+        if folder is None or not model.costly:
             return extend(known, objective, u, deadline=deadline)
 
         def kept(thetas: Array, find: Callable[[], list[Array]]) -> list[Array]:

@@ -1,6 +1,5 @@
 """The guide from one's own files to a verdict, command by command."""
 
-import shutil
 from pathlib import Path
 
 import pytest
@@ -39,7 +38,6 @@ def test_each_command_leads_to_the_next(
     for text in (printed[0], printed[1], printed[3], printed[5]):
         assert "success (the bolt is out)" in text
     assert "SensorBias" in printed[4]
-    shutil.rmtree(checkout / "out")
 
 
 def test_files_are_found_from_the_scenario_s_folder(

@@ -23,6 +23,7 @@ from drake_disasm.learning.hyperparameters import preset
 from drake_disasm.learning.loop import Ended, TrainingLoop
 from drake_disasm.learning.training import Training, TrainingSpec, make_training
 from drake_disasm.mdp import Outcome
+from drake_disasm.policies import TaskView
 from drake_disasm.scenario import load_scenario
 from drake_disasm.twin.batch import BatchedTwin
 from tests.drake_disasm.conftest import without_imprecision
@@ -198,6 +199,17 @@ def test_a_vector_environment_of_gymnasium_is_trained_in(tmp_path: Path) -> None
     torque.reset(seed=[summary.seed for summary, _ in ended[:2]])
     observation, *_ = torque.step(2.0 * rows[:2, 3:4])  # within [-2, 2] N m
     np.testing.assert_allclose(observation, rows[:2, 5:8], atol=1e-6)
+
+
+def test_a_view_of_other_sizes_is_refused() -> None:
+    config = _spec().config
+    agent = ActorCritic(config, 0, False, 3, 1)
+    for view, words in (
+        (TaskView(np.ones(12), np.ones(1)), "12 and 1"),
+        (TaskView(np.ones(3), np.ones(6)), "3 and 6"),
+    ):
+        with refused("view", words, "not of 3 and 1"):
+            Training(agent, config, seed=0, view=view, sizes=(3, 1))
 
 
 def test_a_vector_environment_that_does_not_fit_is_refused() -> None:

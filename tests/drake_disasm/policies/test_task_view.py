@@ -69,6 +69,12 @@ def test_choices_come_back_and_tensors_are_as_arrays(axes: StageAxes) -> None:
     np.testing.assert_allclose(to_numpy(view.to_action(*tensors)), actions)
     seen = to_numpy(view.observe(tensors[0]))
     np.testing.assert_allclose(seen, view.observe(states))
+    placed = view.placed(torch.as_tensor)
+    of_float32 = placed.to_action(tensors[0], tensors[1].float())
+    assert of_float32.dtype == torch.float64
+    np.testing.assert_allclose(to_numpy(of_float32), actions, rtol=1e-6)
+    bare = dataclasses.replace(placed, base=None)
+    assert bare.to_action(tensors[0], tensors[1].float()).dtype == torch.float64
 
 
 def test_rows_of_several_tasks_have_the_view_of_their_own() -> None:
