@@ -80,11 +80,11 @@ def strong(number: int) -> Effect:
     return RustyPatch(_PATCH, random.uniform(*_PLACES), width)
 
 
-def draw(number: int, limits: list[list[Any]]) -> Effect:
+def draw(number: int, limits: list[list[Any]], scenario: Scenario) -> Effect:
     """Returns the effect of a case: another kind for each, as far as there are."""
     random = np.random.default_rng(_SEEDS["effect"])
     known = {str(row[0]) for row in limits if row[2] and row[3] < _FAR}
-    kinds = [kind for kind in observable_effects() if kind.__name__ in known]
+    kinds = [kind for kind in observable_effects(scenario) if kind.__name__ in known]
     order = np.concatenate(
         [random.permutation(len(kinds)) for _ in range(1 + number // len(kinds))]
     )
@@ -126,7 +126,7 @@ def _case(
         real.contact.model = "hydroelastic"  # the only one that the cell has
     if kind != "null":
         limits = [] if is_strong else _limits(out / "null.jsonl")
-        effect = strong(number) if is_strong else draw(number, limits)
+        effect = strong(number) if is_strong else draw(number, limits, scenario)
         real.effects, hidden, name = [effect], repr(effect), type(effect).__name__
     seed = _SEEDS[kind] + _EPISODES * number
     try:

@@ -59,16 +59,15 @@ class Mounting:
     @functools.cached_property
     def X_BS(self) -> Pose:
         """The sensor in the bolt's frame."""
-        X_SB = self.X_SB if isinstance(self.X_SB, Pose) else Pose.of(self.X_SB)
-        return X_SB.inverse()
+        return _as_pose(self.X_SB).inverse()
 
     def from_bolt(self, X_GB: Pose) -> Pose:
         """Returns the sensor's axes, and where it is from Bo: R_GS and p_BoSo_G."""
         if self.X_GS is None:
             X_BS, R = self.X_BS, X_GB.R
             return Pose(namespace(R).matmul(R, X_BS.R), apply_matrix(R, X_BS.p))
-        X_GS = self.X_GS if isinstance(self.X_GS, Pose) else Pose.of(self.X_GS)
-        return Pose(X_GS.R, X_GS.p - X_GB.p)
+        X_GS, xp = _as_pose(self.X_GS), namespace(X_GB.R)
+        return Pose(xp.broadcast_to(X_GS.R, X_GB.R.shape), X_GS.p - X_GB.p)
 
     @property
     def weight_at_start(self) -> Array:
@@ -89,6 +88,10 @@ class Mounting:
         """Returns the payload's load on the sensor, (..., 6) [f; tau] at So in S."""
         R_WS = self.R_WS(as_matrices(R_GS))
         return weight_wrench(self.mass, self.p_SoScm_S, R_WS, self.g_W)
+
+
+def _as_pose(X: RigidTransform | Pose) -> Pose:
+    return X if isinstance(X, Pose) else Pose.of(X)
 
 
 def contact_wrench(

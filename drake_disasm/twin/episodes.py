@@ -16,7 +16,6 @@ from drake_disasm.effects import BoltMotion, MotionEffect
 from drake_disasm.scenario import Scenario, with_values
 from drake_disasm.twin.numbers import TwinNumbers
 from drake_disasm.twin.plant import Plant, PlantState
-from drake_disasm.twin.refusals import refuse_sensor_under_part
 from drake_disasm.twin.scalar_effects import refuse_scalar_effects
 from drake_disasm.twin.slots import EffectSlots
 from drake_disasm.twin.stacking import leaves_of, shared, with_leaves
@@ -76,8 +75,7 @@ class TwinBatch:
         threads: of the host, which share the environments.
 
     Raises:
-        DisasmError: the equation of a user's own effect takes no arrays, or a sensor
-            lies under the part.
+        DisasmError: the equation of a user's own effect takes no arrays.
     """
 
     def __init__(
@@ -86,8 +84,6 @@ class TwinBatch:
         self.like, self.slots, self._threads = like, EffectSlots(scenarios), threads
         refuse_scalar_effects(self.slots.slots, like)
         first = scenarios[0]
-        for scenario in scenarios:
-            refuse_sensor_under_part(scenario)
         self.period = first.task.period
         self.h = first.simulation.twin_time_step
         self._per_sample = max(1, round(first.ft_sensor.period / self.h))
@@ -227,11 +223,13 @@ def _varying_leaves(scenarios: Sequence[Scenario]) -> list[int]:
 
 def _in_columns(numbers: TwinNumbers) -> TwinNumbers:
     """Returns numbers with those of n twins that scale vectors as columns."""
-    replace, mass = dataclasses.replace, numbers.body.mass
-    if isinstance(mass, float):
-        return numbers
-    return replace(
+    body, mounting = numbers.body, numbers.mounting
+    return dataclasses.replace(
         numbers,
-        body=replace(numbers.body, mass=mass[:, None]),
-        mounting=replace(numbers.mounting, mass=mass[:, None]),
+        body=dataclasses.replace(body, mass=_column(body.mass)),
+        mounting=dataclasses.replace(mounting, mass=_column(mounting.mass)),
     )
+
+
+def _column(mass: float | Array) -> float | Array:
+    return mass if isinstance(mass, float) else mass[:, None]

@@ -15,6 +15,7 @@ from drake_disasm.cell.grip import (
     deflection,
 )
 from drake_disasm.cell.placement import nominal_groove_pose
+from drake_disasm.cell.sensor import sensor_under_part
 from drake_disasm.cell.tool import summed
 from drake_disasm.cell.twin_parameters import TwinParameters, twin_of
 from drake_disasm.common.arrays import Array
@@ -128,8 +129,9 @@ class _Case:
         """Returns the case of a scenario."""
         part = scenario.part
         fixed: dict[str, Any] = dict.fromkeys(part.fixed_fields, 0.0)
+        is_weighed = scenario.ft_sensor.place == "part"
         parts = (
-            dataclasses.replace(part, **fixed),
+            part if is_weighed else dataclasses.replace(part, **fixed),
             scenario.simulation.twin_time_step,
             scenario.placement,
             scenario.arm,
@@ -190,6 +192,9 @@ def _mounting(
     scenario: Scenario, M_B: SpatialInertia, parameters: TwinParameters
 ) -> Mounting:
     R_WG = nominal_groove_pose(scenario.placement).rotation().matrix()
-    X_SB = parameters.X_SB
-    p_SoScm_S = X_SB @ M_B.get_com()
-    return Mounting(Pose.of(X_SB), R_WG, M_B.get_mass(), p_SoScm_S, _GRAVITY_W)
+    X_SB, X_GS = parameters.X_SB, None
+    mass, p_SoScm_S = M_B.get_mass(), X_SB @ M_B.get_com()
+    if scenario.ft_sensor.place == "part":
+        there, M_S = sensor_under_part(scenario)
+        mass, p_SoScm_S, X_GS = M_S.get_mass(), M_S.get_com(), Pose.of(there)
+    return Mounting(Pose.of(X_SB), R_WG, mass, p_SoScm_S, _GRAVITY_W, X_GS)

@@ -115,6 +115,7 @@ class PlantStep:
         vdot: (n, 6) second derivatives of the bolt's coordinates in the step.
         outside: (n, 6) wrench of the surroundings on the bolt at Bo in Gn.
         is_solved: (n,) whether contact found a balance, in all steps of the call.
+        f_Gn: (m, 3) of the force in it, what is not the fixed part's; m is n or 1.
     """
 
     state: PlantState
@@ -123,14 +124,22 @@ class PlantStep:
     vdot: Array
     outside: Array
     is_solved: Array
+    f_Gn: Array
 
     @classmethod
-    def of(cls, state: Array, newest: Array, is_solved: Array) -> Self:
+    def of(cls, state: Array, newest: Array, is_solved: Array, f_Gn: Array) -> Self:
         """Returns the step of `equations.advance_rows`' arrays."""
         after, before = (
             (a[:, :12], a[:, 12:18], a[:, 18:24], a[:, 24:]) for a in (state, newest)
         )
-        return cls(PlantState(*after), *before, is_solved)
+        return cls(PlantState(*after), *before, is_solved, f_Gn)
+
+    @property
+    def on_part(self) -> Array:
+        """The wrench on the fixed part (n, 6), [f; tau] in Gn, at Bo before it."""
+        xp = namespace(self.outside)
+        f = self.f_Gn - self.outside[:, :3]
+        return xp.concat([f, -self.outside[:, 3:]], axis=1)
 
     def load(self, body: Body) -> Array:
         """Returns the load on the sensor (n, 6), [f; tau] at Bo in Gn.
@@ -185,7 +194,8 @@ class Plant:
             on_host = tuple(np.ascontiguousarray(to_numpy(table)) for table in tables)
             given = (on_host, self.arm.h, steps, to_numpy(rate), to_numpy(before))
             arrays = _advance_on_host(*given, self.threads)
-        return PlantStep.of(*(xp.asarray(array) for array in arrays))
+        after, newest, is_solved = map(xp.asarray, arrays)
+        return PlantStep.of(after, newest, is_solved, self.conditions.around.f_Gn)
 
     def settled(self, state: PlantState) -> PlantStep:
         """Returns the newest step once the bolts have come to rest."""

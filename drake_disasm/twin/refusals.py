@@ -29,6 +29,7 @@ _SHARED: dict[str, Callable[[Scenario], Any]] = {
     "task.judged_by": lambda s: s.task.judged_by,
     "simulation.twin_time_step": lambda s: s.simulation.twin_time_step,
     "ft_sensor.period": lambda s: s.ft_sensor.period,
+    "ft_sensor.place": lambda s: s.ft_sensor.place,
     "observation.variant": lambda s: s.observation.variant,
 }
 
@@ -106,20 +107,6 @@ def refuse_scenarios(scenarios: Sequence[Scenario]) -> None:
         _refuse_sampling(scenario)
         for end in ("low", "high"):
             _refuse_others(corner(scenario, end), corner(scenarios[0], "low"))
-
-
-def refuse_sensor_under_part(scenario: Scenario) -> None:
-    """Refuses a sensor under the part.
-
-    Raises:
-        DisasmError: says what to use instead.
-    """
-    place = scenario.ft_sensor.place
-    if place == "part":
-        raise DisasmError(
-            f"ft_sensor.place: '{place}' has no form for a batch; set it to wrist or "
-            "none, or use the diagram's twin with contact.model hydroelastic"
-        )
 
 
 def _refuse_others(scenario: Scenario, first: Scenario) -> None:

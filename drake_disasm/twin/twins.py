@@ -4,7 +4,7 @@ import dataclasses
 import functools
 
 from drake_disasm.cell.grip import in_joint_order
-from drake_disasm.common.arrays import Array, namespace
+from drake_disasm.common.arrays import Array
 from drake_disasm.common.spatial import shifted_wrench
 from drake_disasm.effects import BoltMotion, Environment, Sensing
 from drake_disasm.systems.observation import StateFromReadings
@@ -80,8 +80,13 @@ class Twins:
             step: of the plant.
         """
         numbers, coordinates = self.numbers, self.numbers.coordinates
+        mounting = numbers.mounting
+        if mounting.X_GS is not None:
+            there = mounting.from_bolt(coordinates.poses(step.q_before)).inverse()
+            on_part = shifted_wrench(step.on_part, there.R, there.p)
+            return on_part + mounting.weight_at_start
         X_GB, bolt = coordinates.poses(arm[:, :6]), coordinates.poses(step.state.q)
-        X_SGn = numbers.mounting.X_SB @ X_GB.inverse()
+        X_SGn = mounting.X_SB @ X_GB.inverse()
         return shifted_wrench(step.load(numbers.body), X_SGn.R, X_SGn @ bolt.p)
 
     def sensing(self, arm: Array, time: Array) -> Sensing:
@@ -91,10 +96,9 @@ class Twins:
             arm: see `load_S`.
             time: (n,) since the episodes began [s].
         """
-        numbers = self.numbers
-        R_GB = numbers.coordinates.poses(arm[:, :6]).R
-        R_GS = namespace(R_GB).matmul(R_GB, numbers.mounting.X_BS.R)
-        return numbers.payload.sensing(time, numbers.mounting.R_WS(R_GS))
+        numbers, mounting = self.numbers, self.numbers.mounting
+        R_GS = mounting.from_bolt(numbers.coordinates.poses(arm[:, :6])).R
+        return numbers.payload.sensing(time, mounting.R_WS(R_GS))
 
 
 def at_A(like: Array) -> BoltMotion:

@@ -74,7 +74,7 @@ def _tolerated(raw: Sequence[Array], noise: Array, settings: DataSettings) -> Ar
 
 def _zero(episode: Episode, reading: SensorReading) -> Array:
     """Returns the zero (rows, 6) of the sensor that each row implies."""
-    states = at_sensor(observations(episode), reading.X_SB)
+    states = at_sensor(observations(episode), reading.mounting)
     weight = reading.payload.weight(reading.orientations(states))
     return np.asarray(episode["ft_sensor"] - states[:, 6:] - weight)
 

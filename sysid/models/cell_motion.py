@@ -16,7 +16,8 @@ _PALM = np.array([0.0, 0.0, 0.1])  # m, where that force acts, in S
 def sway(scenario: Scenario, station: str, rates: Array, R_SB: Array) -> Array:
     """Returns what moving loads the sensor with (n, 6), beyond what the twin says.
 
-    At the end of each step, [f; tau] at So in S; zero where it was not measured.
+    At the end of each step, [f; tau] at So in S; zero where it was not measured, or
+    the sensor does not move.
 
     Args:
         scenario: of the log.
@@ -26,6 +27,7 @@ def sway(scenario: Scenario, station: str, rates: Array, R_SB: Array) -> Array:
     """
     known = scenario.arm.control == "position" and station == "cell"
     known &= scenario.gripper.compliance == "adaptive"
+    known &= scenario.ft_sensor.place != "part"
     change = np.diff(rates, axis=0, prepend=np.zeros((1, 3)))
     f_S = known * (rates * _STEADY + change * _CHANGE) @ R_SB.T
     return np.hstack([f_S, np.cross(_PALM, f_S)])

@@ -5,8 +5,8 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform
 
+from drake_disasm.systems.observation import Mounting
 from sysid.models.base import Array
 from sysid.models.grip_state import GripState
 from sysid.models.sensor_reading import at_bolt
@@ -48,23 +48,23 @@ class GripObserver:
     Attributes:
         grip: that lags.
         noise: (6,) of the sensor's readings.
-        X_SB: the bolt in the sensor's frame.
+        mounting: of the sensor.
     """
 
     grip: GripState
     noise: Array
-    X_SB: RigidTransform
+    mounting: Mounting
 
     @classmethod
-    def of(cls, whole: Transitions, noise: Array, X_SB: RigidTransform) -> Self:
+    def of(cls, whole: Transitions, noise: Array, mounting: Mounting) -> Self:
         """Returns the observer of a log.
 
         Args:
             whole: all transitions.
             noise: (6,) of the sensor's readings.
-            X_SB: the bolt in the sensor's frame.
+            mounting: of the sensor.
         """
-        return cls(whole.episodes[0].grip, noise, X_SB)
+        return cls(whole.episodes[0].grip, noise, mounting)
 
     def corrected(
         self, whole: Transitions, ends: NDArray[np.int64], led: Led, read: Array
@@ -100,7 +100,7 @@ class GripObserver:
         """
         change = (one.steps.wrench - other.steps.wrench) @ self.grip.to_grip.T
         return np.asarray(
-            change / self.grip.scatter(self.noise, self.X_SB, of_growth=False)
+            change / self.grip.scatter(self.noise, self.mounting, of_growth=False)
         )
 
     def changed(self, one: Transitions, other: Transitions) -> NDArray[np.bool_]:
@@ -116,7 +116,7 @@ class GripObserver:
             whole: all transitions.
             signs: (steps, 6) to which side, along and about the axes of the pads.
         """
-        sigma = self.grip.scatter(_OF_NOISE * self.noise, self.X_SB, of_growth=True)
+        sigma = self.grip.scatter(_OF_NOISE * self.noise, self.mounting, of_growth=True)
         away = self.grip.from_pads(signs * sigma)
         rates = self.grip.rates(away, np.zeros_like(away))
         steps, every = whole.steps, np.arange(len(whole.steps))
@@ -124,7 +124,7 @@ class GripObserver:
 
     def _on_bolt(self, states: Array, wrench: Array) -> Array:
         """Returns wrenches (n, 6) at Bo in Gn, of those at So in S."""
-        return at_bolt(np.hstack([states[:, :6], wrench]), self.X_SB)[:, 6:]
+        return at_bolt(np.hstack([states[:, :6], wrench]), self.mounting)[:, 6:]
 
 
 def shrunk(missed: Array, noise: Array) -> Array:

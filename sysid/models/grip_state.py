@@ -5,7 +5,6 @@ import functools
 from typing import Self
 
 import numpy as np
-from pydrake.math import RigidTransform
 from pydrake.multibody.tree import UniformGravityFieldElement
 from scipy.spatial.transform import Rotation
 
@@ -16,6 +15,7 @@ from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.rotations import matrices_of_turns
 from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.scenario import Scenario
+from drake_disasm.systems.observation import Mounting
 from sysid.models.base import Array
 from sysid.models.commands import bolt_path
 from sysid.models.sensor_reading import at_bolt
@@ -174,7 +174,7 @@ class GripState:
         """
         return self.from_pads(self._weights[2] * (wrench @ self.to_grip.T))
 
-    def scatter(self, noise: Array, X_SB: RigidTransform, of_growth: bool) -> Array:
+    def scatter(self, noise: Array, mounting: Mounting, of_growth: bool) -> Array:
         """Returns the standard deviation of the springs' wrench (6,) at the pads.
 
         That of `elastic` in a long episode: e' = f e + b w + c w' of white noise w has
@@ -182,14 +182,14 @@ class GripState:
 
         Args:
             noise: (6,) of the sensor's readings, [f; tau] at So in S.
-            X_SB: the bolt in the sensor's frame.
+            mounting: of the sensor.
             of_growth: whether the noise of its end alone grows evenly in each step.
         """
         forgets, of_begin, of_end = self._weights
         of_begin = 0.0 if of_growth else of_begin
         gain = of_begin**2 + of_end**2 + 2.0 * forgets * of_begin * of_end
         each = np.hstack([np.zeros((6, 6)), np.diag(noise)])
-        at_pads = at_bolt(each, X_SB)[:, 6:] @ self.to_grip.T
+        at_pads = at_bolt(each, mounting)[:, 6:] @ self.to_grip.T
         sigma = np.linalg.norm(at_pads, axis=0)
         return np.asarray(sigma * np.sqrt(gain / (1.0 - forgets**2)))
 

@@ -59,7 +59,7 @@ class MeasuredEpisode:
     def at_sensor(self, sensing: SensorReading, p_BoTo_B: Array) -> Array:
         """Returns the states (n + 1, 12) with the wrench at So in S."""
         poses = bolt_path(self.measured, p_BoTo_B)
-        return at_sensor(np.hstack([poses, self.wrench]), sensing.X_SB)
+        return at_sensor(np.hstack([poses, self.wrench]), sensing.mounting)
 
     def without(self, offset: Array, sensing: SensorReading, p_BoTo_B: Array) -> Self:
         """Returns the episode with a wrench (6,) at So in S taken off."""
@@ -67,7 +67,9 @@ class MeasuredEpisode:
             return self
         states = self.at_sensor(sensing, p_BoTo_B)
         states[:, 6:] -= offset
-        return dataclasses.replace(self, wrench=at_bolt(states, sensing.X_SB)[:, 6:])
+        return dataclasses.replace(
+            self, wrench=at_bolt(states, sensing.mounting)[:, 6:]
+        )
 
     def begins_elsewhere(self, other: Self, noticeable: tuple[float, float]) -> bool:
         """Returns whether the grip gives or creeps by (m, rad) more than another's."""

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
-from pydrake.math import RigidTransform
 from pydrake.multibody.tree import UniformGravityFieldElement
 from scipy.spatial.transform import Rotation
 
 from drake_disasm.cell.placement import nominal_groove_pose
+from drake_disasm.cell.sensor import sensor_under_part
 from drake_disasm.cell.tool import Tool
-from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.rotations import Pose
+from drake_disasm.common.spatial import shifted_wrench
 from drake_disasm.devices.sensor_chain import (
     Payload,
     sensed_along,
@@ -20,6 +21,7 @@ from drake_disasm.effects import Sensing, SensorEffect
 from drake_disasm.logs import Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.scenario import Scenario
+from drake_disasm.systems.observation import Mounting
 from sysid.models.base import Array
 
 
@@ -28,57 +30,40 @@ def station_of(log: Log) -> str:
     return str(log.header.provenance.get("station", ""))
 
 
-def at_sensor(states: Array, X_SB: RigidTransform) -> Array:
-    """Returns states with the wrench at So in S in place of that at Bo in G.
+def at_sensor(states: Array, mounting: Mounting) -> Array:
+    """Returns states with the load at So in S in place of the wrench at Bo in G.
 
     The inverse of the last step of observation processing.
 
     Args:
         states: (n, 12), position, rotation vector and wrench [f; tau] at Bo, in G.
-        X_SB: the bolt in the sensor's frame.
+        mounting: of the sensor.
     """
-    X_BS = X_SB.inverse()
-    R_GB = Rotation.from_rotvec(states[:, 3:6]).as_matrix()
-    p_BoSo_G = R_GB @ X_BS.translation()
-    f_G, t_Bo_G = states[:, 6:9], states[:, 9:12]
-    t_So_G = t_Bo_G - np.cross(p_BoSo_G, f_G)
-    R_GS = R_GB @ X_BS.rotation().matrix()
-    in_S = [np.einsum("nij,ni->nj", R_GS, vector) for vector in (f_G, t_So_G)]
-    return np.hstack([states[:, :6], *in_S])
+    there = _from_bolt(states, mounting).inverse()
+    load = mounting.sign * shifted_wrench(states[:, 6:], there.R, there.p)
+    return np.hstack([states[:, :6], load])
 
 
-def at_bolt(states: Array, X_SB: RigidTransform) -> Array:
+def at_bolt(states: Array, mounting: Mounting) -> Array:
     """Returns states (n, 12) with the wrench at Bo in G again: undoes `at_sensor`."""
-    X_BS = X_SB.inverse()
+    there = _from_bolt(states, mounting)
+    wrench = mounting.sign * shifted_wrench(states[:, 6:], there.R, there.p)
+    return np.hstack([states[:, :6], wrench])
+
+
+def _from_bolt(states: Array, mounting: Mounting) -> Pose:
+    """Returns where the sensor is (n,) from Bo, along the axes of G."""
     R_GB = Rotation.from_rotvec(states[:, 3:6]).as_matrix()
-    R_GS = R_GB @ X_BS.rotation().matrix()
-    f_G, t_So_G = (
-        np.einsum("nij,nj->ni", R_GS, part) for part in (states[:, 6:9], states[:, 9:])
-    )
-    t_Bo_G = t_So_G + np.cross(R_GB @ X_BS.translation(), f_G)
-    return np.hstack([states[:, :6], f_G, t_Bo_G])
-
-
-def refuse_sensor_under_part(scenario: Scenario) -> None:
-    """Refuses a scenario whose sensor does not move with the bolt.
-
-    Raises:
-        DisasmError: says which places are identified.
-    """
-    if scenario.ft_sensor.place == "part":
-        raise DisasmError(
-            "ft_sensor.place: 'part' can't be identified or checked; record with the "
-            "sensor in the wrist, or with none"
-        )
+    return mounting.from_bolt(Pose(R_GB, states[:, :3]))
 
 
 class SensorReading:
     """How the sensor's effects change processed wrenches, many at once.
 
     Attributes:
-        X_SB: the bolt in the sensor's frame.
-        payload: what hangs on the log's sensor: the gripper and the bolt, or bolt and
-            fingers alone if it is the twin's.
+        mounting: of the sensor, with what hangs on the log's: the gripper and the bolt,
+            or bolt and fingers alone if it is the twin's; or the fixed part on it.
+        payload: the same load.
 
     Processing takes the reading at zeroing off, and the change of the known weight
     since then (`contact_wrench`); so what effects add to readings, and to the
@@ -92,21 +77,21 @@ class SensorReading:
             scenario: of the log.
             tool: on the flange.
             station: where the log was recorded: "cell", "hardware", or the twin.
-
-        Raises:
-            DisasmError: the sensor does not move with the bolt.
         """
-        refuse_sensor_under_part(scenario)
-        self.X_SB = tool.X_SB
-        self._R_WG = nominal_groove_pose(scenario.placement).rotation().matrix()
-        self._R_BS = tool.X_SB.inverse().rotation().matrix()
-        g_W = UniformGravityFieldElement().gravity_vector()
         carried = tool.M_gripped_B
-        p_SoScm_S = tool.X_SB @ carried.get_com()
-        self.payload = Payload(carried.get_mass(), p_SoScm_S, g_W)
-        self._of_twin = self.at_rest
+        of_twin = carried.get_mass(), tool.X_SB @ carried.get_com()
+        of_log = of_twin
         if station in ("cell", "hardware"):
-            self.payload = Payload(tool.mass, tool.p_SoScm_S, g_W)
+            of_log = tool.mass, tool.p_SoScm_S
+        X_GS = None
+        if scenario.ft_sensor.place == "part":
+            X_GS, M_S = sensor_under_part(scenario)
+            of_log = of_twin = M_S.get_mass(), M_S.get_com()
+        R_WG = nominal_groove_pose(scenario.placement).rotation().matrix()
+        g_W = UniformGravityFieldElement().gravity_vector()
+        self.mounting = Mounting(tool.X_SB, R_WG, *of_log, g_W, X_GS)
+        self.payload = Payload(*of_log, g_W)
+        self._of_twin = Mounting(tool.X_SB, R_WG, *of_twin, g_W, X_GS).weight_at_start
 
     @classmethod
     def of(cls, logs: Sequence[Log], scenario: Scenario) -> Self:
@@ -132,9 +117,14 @@ class SensorReading:
         return np.asarray(reading + self.at_rest - self._of_twin)
 
     @property
+    def p_SoBo_S(self) -> Array:
+        """The bolt at A (3,) from the sensor, in S [m]."""
+        return _from_bolt(np.zeros((1, 12)), self.mounting).inverse().p[0]
+
+    @property
     def at_rest(self) -> Array:
         """The reading (6,) at A under the known weight alone, without effects."""
-        return self.payload.weight(self._R_WG @ self._R_BS)
+        return self.mounting.weight_at_start
 
     def raw(self, states: Array, zero: Array) -> Array:
         """Returns the raw readings (n, 6) in S of states (n, 12), wrench at So in S.
@@ -167,7 +157,8 @@ class SensorReading:
         """
         raw = self.raw(states, zero)
         sensing = self.sensing(states, times)
-        rest = self.payload.sensing(np.array(0.0), self._R_WG @ self._R_BS)
+        [R_WS] = self.orientations(np.zeros((1, 6)))
+        rest = self.payload.sensing(np.array(0.0), R_WS)
         load = sensed_along(raw, effects, sensing, zero, rest)
         seen = sensed_at_zeroing(zero, effects, rest)
         change = (load - raw) - (seen - zero)
@@ -187,5 +178,4 @@ class SensorReading:
 
     def orientations(self, states: Array) -> Array:
         """Returns the orientations (n, 3, 3) of the sensor in W, of states (n, 12)."""
-        R_GB = Rotation.from_rotvec(states[:, 3:6]).as_matrix()
-        return np.asarray(self._R_WG @ R_GB @ self._R_BS)
+        return np.asarray(self.mounting.R_WS(_from_bolt(states, self.mounting).R))

@@ -29,7 +29,6 @@ from sysid.models.bookkeeping import Bookkeeping, Frame, Poses
 from sysid.models.channel_grams import likely
 from sysid.models.measurements import Channel, Measurements
 from sysid.models.scenario_model import ScenarioModel
-from sysid.models.sensor_reading import refuse_sensor_under_part
 from sysid.models.wrench_bookkeeping import Readings, better_ways, has_no_weight
 from sysid.parameters import Parameter
 
@@ -262,7 +261,11 @@ def _rotated(R: Array, wrench: Array) -> Array:
 
 
 def _payload(scenario: Scenario) -> Payload:
-    refuse_sensor_under_part(scenario)
+    if scenario.ft_sensor.place == "part":
+        raise DisasmError(
+            "ft_sensor.place: a sensor under the part never turns, so its readings at "
+            "rest tell nothing; give logs of transitions"
+        )
     tool = Tool.from_models(scenario)
     return Payload(tool.mass, tool.p_SoScm_S, _GRAVITY_W)
 

@@ -118,7 +118,7 @@ class Transitions:
         found = cls(
             steps=steps,
             before=np.concatenate(
-                [at_sensor(observations(e)[:-1], sensing.X_SB) for e in episodes]
+                [at_sensor(observations(e)[:-1], sensing.mounting) for e in episodes]
             ),
             rows=np.arange(len(steps)),
             recorded=recorded,
@@ -310,7 +310,7 @@ def measured_states(
     found = Measurements.of_logs(
         logs,
         _channels(scenario),
-        lambda _, episode: at_sensor(observations(episode)[1:], sensing.X_SB),
+        lambda _, episode: at_sensor(observations(episode)[1:], sensing.mounting),
     )
     head = scenario.part.touch_radius
     error = np.concatenate([_model_error(log, sensing, head) for log in logs])
@@ -335,7 +335,7 @@ def _model_error(log: Log, sensing: SensorReading, head: float) -> Array:
         return found
     least, share = FORCE_ERROR
     force = np.hypot(least, share * change)
-    lever = np.abs(sensing.X_SB.translation())
+    lever = np.abs(sensing.p_SoBo_S)
     across = np.sqrt(np.maximum(lever @ lever - lever**2, 0.0) + head**2)
     found[:, :3], found[:, 3:6] = POSE_ERROR
     found[:, 6:9] = force[:, None]
@@ -390,7 +390,7 @@ def _load_at_begin(log: Log, noise: Array, sensing: SensorReading) -> Array:
         sensing: of the scenario.
     """
     states = np.array([observations(episode)[0] for episode in log.episodes])
-    first = np.mean(at_sensor(states, sensing.X_SB)[:, 6:], axis=0)
+    first = np.mean(at_sensor(states, sensing.mounting)[:, 6:], axis=0)
     by_chance = _OFFSET * noise / np.sqrt(len(states))
     return np.where(np.abs(first) > by_chance, 0.0, first)
 
@@ -422,7 +422,7 @@ def _without_offset(
 def _sway(log: Log, scenario: Scenario, sensing: SensorReading) -> Array:
     """Returns what moving loads the sensor with (rows, 6), at So in S."""
     station = station_of(log)
-    R_SB = sensing.X_SB.rotation().matrix()
+    R_SB = sensing.mounting.X_BS.R.T
     paths = [e["X_GB_commanded"][:, :3] for e in log.episodes]
     rates = [np.diff(path, axis=0) / scenario.task.period for path in paths]
     return np.concatenate([sway(scenario, station, rate, R_SB) for rate in rates])

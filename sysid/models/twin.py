@@ -129,7 +129,7 @@ class TwinModel(SimulatedModel):
     ) -> Array:
         """Returns the states and the reading at zeroing (len(rows), 18)."""
         states = transitions.of_encoders(found.states, steps, rows)
-        states = at_sensor(states, self.reading.X_SB)
+        states = at_sensor(states, self.reading.mounting)
         states[:, 6:] += self._transitions.sway[rows]
         zero = self.reading.zeroed(found.reading_at_zeroing)
         return np.hstack([states, np.broadcast_to(zero, (len(states), 6))])
@@ -281,7 +281,7 @@ class TwinModel(SimulatedModel):
     @property
     def _observer(self) -> GripObserver:
         noise = self.measurements.noise[6:]
-        return GripObserver.of(self._whole, noise, self.reading.X_SB)
+        return GripObserver.of(self._whole, noise, self.reading.mounting)
 
     def _observed(self, theta: Array, whole: Transitions) -> Transitions:
         """Returns all transitions, those of this model beginning as it has the grip.
@@ -332,11 +332,11 @@ class TwinModel(SimulatedModel):
 
     def frames(self, rows: NDArray[np.int64]) -> list[Frame]:
         """See LogModel."""
-        X_SB = self.reading.X_SB
+        mounting = self.reading.mounting
         in_table = Frame(
             "wrench, in G at Bo",
-            lambda v: at_bolt(v, X_SB),
-            lambda v: at_sensor(v, X_SB),
+            lambda v: at_bolt(v, mounting),
+            lambda v: at_sensor(v, mounting),
         )
         return [in_table, Frame("ft_sensor, in S at So")]
 

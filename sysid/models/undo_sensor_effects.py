@@ -46,7 +46,7 @@ def undo_sensor_effects(
         return found[:, 6:].reshape(wrench.shape)
 
     found = np.hstack([read[:, :6], undone(reading, read[:, 6:])])
-    wrench = at_bolt(found, sensing.X_SB)[:, 6:]
+    wrench = at_bolt(found, sensing.mounting)[:, 6:]
     parts = np.split(wrench, np.cumsum([len(own) for own in states])[:-1])
     return [
         dataclasses.replace(episode, wrench=part)

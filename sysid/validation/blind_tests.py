@@ -104,14 +104,16 @@ def nominal() -> Scenario:
     return scenario
 
 
-def observable_effects() -> tuple[type[Effect], ...]:
-    """Returns the effects that show in transitions of the twin."""
+def observable_effects(scenario: Scenario) -> tuple[type[Effect], ...]:
+    """Returns the effects that show in transitions of a scenario's twin."""
+    parts = "", type(scenario.part).__name__
     acts = (EnvironmentEffect, MotionEffect, PoseEffect, SensorEffect)
     return tuple(
         effect
         for effect in registered_effects()
         if issubclass(effect, acts) and effect.is_physical
         if not getattr(effect, "removed_by_zeroing", False)
+        if getattr(effect, "of_part", "") in parts
     )
 
 
@@ -218,7 +220,7 @@ def single_cases(levels: Sequence[float], seeds: Sequence[int]) -> list[Case]:
     """Returns every effect at every level with every seed."""
     return [
         Case((effect.__name__,), level, seed)
-        for effect in observable_effects()
+        for effect in observable_effects(nominal())
         for level in levels
         for seed in seeds
     ]
@@ -238,14 +240,14 @@ def left_out_cases(level: float, seeds: Sequence[int]) -> list[Case]:
     """Returns every effect, each missing in the library."""
     return [
         Case((effect.__name__,), level, seed, left_out=(effect.__name__,))
-        for effect in observable_effects()
+        for effect in observable_effects(nominal())
         for seed in seeds
     ]
 
 
 def _several(count: int) -> Iterator[tuple[str, ...]]:
     """Yields so many different effects, in a random, repeatable order."""
-    names = [effect.__name__ for effect in observable_effects()]
+    names = [effect.__name__ for effect in observable_effects(nominal())]
     random = np.random.default_rng(0)
     while True:
         drawn = random.choice(len(names), count, replace=False)

@@ -157,16 +157,16 @@ def rollout(
     [zero] = replay.reading_at_zeroing
     states[:, 0] += _last_read(reading, sensor, clean[:, :1], zero, np.zeros(1))
     for k in range(size - 1):
-        in_G = at_bolt(states[:, k], reading.X_SB)
+        in_G = at_bolt(states[:, k], reading.mounting)
         for e in range(count):
             executed[e, k + 1], memories[e] = through_motion(
                 motion, commanded[e, k + 1], in_G[e, 6:], memories[e], times[0]
             )
         if is_undone:
-            in_G = at_bolt(clean[:, k] + noise_of_states[:, k], reading.X_SB)
+            in_G = at_bolt(clean[:, k] + noise_of_states[:, k], reading.mounting)
         step = measured.steps(k, in_G, executed[:, k : k + 2])
         [after] = replay.transitions([step])
-        clean[:, k + 1] = at_sensor(after, reading.X_SB)
+        clean[:, k + 1] = at_sensor(after, reading.mounting)
         so_far = clean[:, 1 : k + 2]
         states[:, k + 1] += _last_read(reading, sensor, so_far, zero, times[: k + 1])
     readings = np.array([reading.raw(s, zero) for s in states])
@@ -247,7 +247,7 @@ class _Measured:
 
 def _columns(scenario: Scenario, path: Array, states: Array) -> dict[str, Array]:
     """Returns the columns of an episode's log."""
-    X_SB = Tool.from_models(scenario).X_SB
+    mounting = SensorReading(scenario, Tool.from_models(scenario)).mounting
     actions = np.zeros_like(path)
     turn = Rotation.from_rotvec(path[:, 3:])
     actions[:-1, :3] = np.diff(path[:, :3], axis=0)
@@ -258,7 +258,7 @@ def _columns(scenario: Scenario, path: Array, states: Array) -> dict[str, Array]
         "time": np.arange(rows) * scenario.task.period,
         "X_GB_measured": _poses(states[:, :6]),
         "X_GB_commanded": _poses(path),
-        "wrench": at_bolt(states, X_SB)[:, 6:],
+        "wrench": at_bolt(states, mounting)[:, 6:],
         "action": actions,
         "terminated": np.zeros(rows, dtype=bool),
         "truncated": last,

@@ -204,6 +204,23 @@ def test_a_gpu_simulates_the_same_episodes(batch):
     _assert_same(np.array(found).reshape(-1, 12), batch.reshape(-1, 12))
 
 
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [("removal_turned", []), ("iiwa_peg", ["part.cross_section=square"])],
+)
+def test_a_sensor_under_the_part_reads_what_the_diagrams_does(name, settings):
+    """What pulls on the bolt besides the part does not reach it."""
+    scenario = load_scenario(name, [*SETTINGS, "ft_sensor.place=part", *settings])
+    pull, late = ef.ChainPull(fx=2.0), ef.SensorLag(0.05)
+    scenario, moves = (
+        dataclasses.replace(scenario, effects=[pull, late]),
+        actions(BEGIN),
+    )
+    expected, found = _diagram(scenario, moves), _batch([scenario], moves)[:, 0]
+    assert np.linalg.norm(expected[:, 6:9], axis=1).max() > 0.5
+    _assert_same(found, expected)
+
+
 def test_springs_tell_the_wrench_as_the_diagrams_where_there_is_no_sensor():
     settings = [*SETTINGS, "ft_sensor.place=none"]
     scenario, moves = load_scenario("removal_turned", settings), actions(BEGIN)

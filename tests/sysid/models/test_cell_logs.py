@@ -33,6 +33,18 @@ def cell_log(tmp_path_factory) -> Log:
     return record_transitions(folder, simulation, _STEPS)
 
 
+def test_the_twin_predicts_what_a_sensor_under_the_part_reads(tmp_path):
+    """Which moving loads with nothing, and the weight of what is moved neither."""
+    scenario = load_scenario("removal", ["ft_sensor.place=part"])
+    policy = Exploring(make_policy("admittance", scenario), 1.5e-4, 0)
+    simulation = TaskSimulation(scenario, "cell", policy)
+    log = record_transitions(tmp_path / "log", simulation, _STEPS)
+    residual = _residual(log, scenario)
+    assert max(map(rms, residual.T)) < 1.2
+    in_the_wrist = _residual(log, _SCENARIO)
+    assert max(map(rms, in_the_wrist[:, 9:].T)) > 1.4
+
+
 def _as_of(log: Log, station: str) -> Log:
     """Returns the same log, said to be of another station."""
     provenance = {**log.header.provenance, "station": station}

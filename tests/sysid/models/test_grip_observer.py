@@ -13,6 +13,7 @@ from drake_disasm.logs import Log, LogWriter, read_log
 from drake_disasm.logs.columns import flat_columns
 from drake_disasm.policies import Exploring, make_policy
 from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.systems.observation import Mounting
 from drake_disasm.task.episode import run_episode
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 from drake_disasm.task.simulation import TaskSimulation
@@ -79,7 +80,8 @@ def test_noise_scatters_the_springs_wrench_as_stated():
     noise = np.array([0.1] * 3 + [0.01] * 3)
     read = noise * random.standard_normal((4000, 6))
     found = np.std(grip.elastic(read) @ grip.to_grip.T, axis=0)
-    stated = grip.scatter(noise, RigidTransform(), of_growth=False)
+    mounting = Mounting(RigidTransform(), np.eye(3), 0.0, np.zeros(3), np.zeros(3))
+    stated = grip.scatter(noise, mounting, of_growth=False)
     np.testing.assert_allclose(found, stated, rtol=0.05)
 
 

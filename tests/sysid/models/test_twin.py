@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from drake_disasm.common.spatial import rotation_from_vector, shift_and_express
+from drake_disasm.common.rotations import Pose
+from drake_disasm.common.spatial import rotation_from_vector
 from drake_disasm.parts import ImpactConfig
 from drake_disasm.scenario import load_scenario, validate
+from drake_disasm.systems.observation import Mounting, contact_wrench
 from sysid.identification.gauss_newton import gauss_newton
 from sysid.models import PredictionError
-from sysid.models.twin import TwinModel, at_sensor
+from sysid.models.sensor_reading import at_bolt, at_sensor
+from sysid.models.twin import TwinModel
 from sysid.objective import Objective
 from sysid.scenario_parameters import ParameterRequest, scenario_parameters
 from sysid.workers import Workers
@@ -138,15 +141,24 @@ def test_refuses_other_logs(log, turned):
         make(dataclasses.replace(log, header=header), turned)
 
 
-def test_the_wrench_at_the_sensor_is_the_inverse_of_the_shift_to_the_bolt():
-    X_SB = RigidTransform(RollPitchYaw(0.3, -0.2, 0.9), [0.01, 0.02, 0.21])
+X_SOMEWHERE = RigidTransform(RollPitchYaw(0.3, -0.2, 0.9), [0.01, 0.02, 0.21])
+
+
+@pytest.mark.parametrize("X_GS", [None, X_SOMEWHERE], ids=["wrist", "part"])
+def test_the_load_on_the_sensor_is_the_inverse_of_processing(X_GS):
+    g_W = np.array([0.0, 0.0, -9.81])
+    mounting = Mounting(X_SOMEWHERE, np.eye(3), 1.5, np.ones(3), g_W, X_GS)
     load, turn = np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3]), np.array([0.1, -0.05, 0.2])
-    X_GS = RigidTransform(rotation_from_vector(turn), np.zeros(3)) @ X_SB.inverse()
-    at_bolt = shift_and_express(load, X_GS)
-    state = np.concatenate([[1e-3, 2e-3, 3e-3], turn, at_bolt])
-    found = at_sensor(state[None], X_SB)[0]
-    np.testing.assert_allclose(found[6:], load, atol=1e-12)
-    np.testing.assert_array_equal(found[:6], state[:6])
+    X_GB = RigidTransform(rotation_from_vector(turn), [1e-3, 2e-3, 3e-3])
+    R_GS = mounting.from_bolt(Pose.of(X_GB)).R
+    offset = 0.1 * np.arange(6)
+    reading = load + offset + mounting.weight(R_GS)
+    wrench = contact_wrench(reading, offset, Pose.of(X_GB), mounting)
+    state = np.concatenate([X_GB.translation(), turn, wrench])[None]
+    found = at_sensor(state, mounting)
+    np.testing.assert_allclose(found[0, 6:], load, atol=1e-12)
+    np.testing.assert_array_equal(found[:, :6], state[:, :6])
+    np.testing.assert_allclose(at_bolt(found, mounting), state, atol=1e-12)
 
 
 def test_a_surrogate_is_as_stiff_as_the_head(log, turned):

@@ -85,7 +85,7 @@ def test_answers_are_kept_and_not_asked_for_again(tmp_path):
 
 
 def test_several_effects_differ_and_can_show():
-    names = {effect.__name__ for effect in observable_effects()}
+    names = {effect.__name__ for effect in observable_effects(nominal())}
     for case in several_cases(3, 3.0, range(20)):
         assert len(set(case.effects)) == 3 and set(case.effects) <= names
 
@@ -109,7 +109,7 @@ def test_the_first_reading_has_what_the_sensor_adds(tmp_path):
     noise = model.measurements.sigma[6:]
     first = np.array(
         [
-            at_sensor(observations(e)[:1], model.reading.X_SB)[0, 6:]
+            at_sensor(observations(e)[:1], model.reading.mounting)[0, 6:]
             for e in read_log(tmp_path / "log").episodes
         ]
     )
