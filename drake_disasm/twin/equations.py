@@ -872,6 +872,9 @@ def _find_slot(w: np.ndarray) -> None:
     _circle_between(middle, pz + middle * uz, 2, head, wall, 4, w)
     _circle_between(middle, px + middle * ux, 0, head, end, _STOPS, w)
     w[DEPTH + _STOPS + 1] = start - (px + middle * ux - head)
+    if py + bottom * uy >= lip:  # the head is above the plate
+        for k in range(4, _PLANES):
+            w[DEPTH + k] = -1.0
     xx, yx, zx = w[R_GB], w[R_GB + 3], w[R_GB + 6]
     xz, yz, zz = w[R_GB + 2], w[R_GB + 5], w[R_GB + 8]
     for i in range(_RIM_POINTS):

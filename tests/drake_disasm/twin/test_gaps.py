@@ -74,6 +74,14 @@ def test_touches_where_the_lock_is(position, depth, normal):
     np.testing.assert_array_equal(direction, normal)
 
 
+def test_nothing_touches_a_bolt_above_the_plate():
+    """The stop ends at the plate's upper face, which the head's underside passes."""
+    part = DoorChain()
+    level = (part.gaps.lip - part.gaps.bottom) / MM
+    assert deepest([60.6, level - 0.1, 0.0])[0] == pytest.approx(0.1, abs=1e-9)
+    assert deepest([60.6, level + 0.1, 0.0])[0] < 0.0
+
+
 def test_a_quarter_turn_changes_nothing_for_a_round_bolt():
     """Its rim has eight points, so they take each other's places."""
     quarter = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
