@@ -48,6 +48,8 @@ POSE_ERROR = (2e-5, 4e-5)
 #: in a million logs of six channels.
 _OFFSET = 5.0
 
+_RELEASE = 2  # steps in which a part comes free
+
 #: By how much the grip gives, so that a step begins noticeably elsewhere [m, rad]: a
 #: tenth of what encoders repeat.
 _NOTICEABLE = (0.1 * POSE_NOISE[0], 0.1 * POSE_NOISE[1])
@@ -321,7 +323,8 @@ def _model_error(log: Log, sensing: SensorReading, head: float) -> Array:
     """Returns by how much the twin is off (rows, 12) in a log of an arm, 1 sigma.
 
     The force may be off to any side, and turns the sensor with the lever to the bolt,
-    on whose head it acts anywhere. A log of the twin has none.
+    on whose head it acts anywhere; where a part comes free, by the whole load. A log of
+    the twin has none.
 
     Args:
         log: of transitions.
@@ -340,7 +343,28 @@ def _model_error(log: Log, sensing: SensorReading, head: float) -> Array:
     found[:, :3], found[:, 3:6] = POSE_ERROR
     found[:, 6:9] = force[:, None]
     found[:, 9:] = force[:, None] * across
-    return found
+    return np.hypot(found, _lost_at_the_end(log))
+
+
+def _lost_at_the_end(log: Log) -> Array:
+    """Returns the load (rows, 12) that is lost as a part comes free; elsewhere zero.
+
+    That ends an episode. In which of the last two steps contact is lost, a moment
+    decides.
+    """
+    found = []
+    for episode in log.episodes:
+        states = observations(episode)
+        lost = np.zeros((len(states) - 1, 12))
+        force, torque = (np.linalg.norm(states[:, i : i + 3], axis=1) for i in (6, 9))
+        is_free = (
+            bool(episode["terminated"][-1]) and force[-1] < force[-_RELEASE - 1 :][0]
+        )
+        if is_free:
+            lost[-_RELEASE:, 6:9] = force[-_RELEASE - 1 :][0]
+            lost[-_RELEASE:, 9:] = torque[-_RELEASE - 1 :][0]
+        found.append(lost)
+    return np.concatenate(found)
 
 
 def _channels(scenario: Scenario) -> tuple[Channel, ...]:

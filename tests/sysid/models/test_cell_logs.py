@@ -151,3 +151,21 @@ def test_logs_of_twin_and_cell_have_other_loads_on_their_sensors(cell_log):
     with refused("logs of the twin", "logs of a cell"):
         TwinModel([cell_log, _as_of(cell_log, "twin")], _SCENARIO, ())
     TwinModel([cell_log, _as_of(cell_log, "hardware")], _SCENARIO, ())
+
+
+def test_where_a_part_comes_free_the_whole_load_may_be_lost(cell_log):
+    """In the last two steps of an episode that ends so, whenever contact is lost."""
+    (episode,) = cell_log.episodes
+    columns = {name: values.copy() for name, values in episode.columns.items()}
+    columns["terminated"][-1] = True
+    for axis, load in (("fy", 8.0), ("tz", 0.25)):
+        columns[f"wrench.{axis}"][-3:] = load, 0.8 * load, 0.0
+    freed = dataclasses.replace(episode, columns=columns)
+    errors = [
+        TwinModel(
+            [dataclasses.replace(cell_log, episodes=(e,))], _SCENARIO, ()
+        ).measurements.model_error
+        for e in (episode, freed)
+    ]
+    assert np.all(errors[1][-2:, 6:9] > 8.0) and np.all(errors[1][-2:, 9:] > 0.25)
+    np.testing.assert_array_equal(errors[1][:-3], errors[0][:-3])
