@@ -11,7 +11,7 @@ from drake_disasm.cell.coordinates import BoltCoordinates
 from drake_disasm.cell.tool import Tool
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.effects import MotionEffect, SensorEffect, SensorMemoryEffect
-from drake_disasm.logs import Log
+from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
 from drake_disasm.logs.transitions import observations
 from drake_disasm.mdp import STATE_NAMES
@@ -347,24 +347,33 @@ def _model_error(log: Log, sensing: SensorReading, head: float) -> Array:
 
 
 def _lost_at_the_end(log: Log) -> Array:
-    """Returns the load (rows, 12) that is lost as a part comes free; elsewhere zero.
+    """Returns what a part that comes free may be off by (rows, 12); elsewhere zero.
 
     That ends an episode. In which of the last two steps contact is lost, a moment
-    decides.
+    decides: the whole load, and how far the arm springs back, beyond its motion in the
+    step before.
     """
-    found = []
-    for episode in log.episodes:
-        states = observations(episode)
-        lost = np.zeros((len(states) - 1, 12))
-        force, torque = (np.linalg.norm(states[:, i : i + 3], axis=1) for i in (6, 9))
-        is_free = (
-            bool(episode["terminated"][-1]) and force[-1] < force[-_RELEASE - 1 :][0]
-        )
-        if is_free:
-            lost[-_RELEASE:, 6:9] = force[-_RELEASE - 1 :][0]
-            lost[-_RELEASE:, 9:] = torque[-_RELEASE - 1 :][0]
-        found.append(lost)
-    return np.concatenate(found)
+    return np.concatenate([_lost(episode) for episode in log.episodes])
+
+
+def _lost(episode: Episode) -> Array:
+    """Returns the same of an episode (n, 12)."""
+    states = observations(episode)
+    lost = np.zeros((len(states) - 1, 12))
+    force, torque = _lengths(states[-_RELEASE - 1 :, 6:])
+    has_ended = bool(episode["terminated"][-1]) and len(lost) > _RELEASE
+    if not has_ended or force[-1] >= force[0]:  # or by a limit
+        return lost
+    moved = np.diff(states[-_RELEASE - 2 :, :6], axis=0)
+    way, turn = _lengths(moved[1:] - moved[0])
+    lost[-_RELEASE:] = np.repeat([way.max(), turn.max(), force[0], torque[0]], 3)
+    return lost
+
+
+def _lengths(pairs: Array) -> tuple[Array, Array]:
+    """Returns the lengths (n,) of both vectors of pairs (n, 6)."""
+    first, second = np.hsplit(pairs, 2)
+    return np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
 
 
 def _channels(scenario: Scenario) -> tuple[Channel, ...]:
