@@ -28,9 +28,9 @@ from drake_disasm.common.spatial import (
     rotation_from_vector,
     rotation_vector,
     shifted_wrench,
-    weight_wrench,
 )
 from drake_disasm.common.timing import MOTION_DELAY
+from drake_disasm.devices.sensor_chain import Payload
 from drake_disasm.effects import LONGEST_POSE_MEMORY, Effect, pose_weights
 
 
@@ -70,6 +70,11 @@ class Mounting:
         return Pose(xp.broadcast_to(X_GS.R, X_GB.R.shape), X_GS.p - X_GB.p)
 
     @property
+    def payload(self) -> Payload:
+        """What the sensor is known to carry."""
+        return Payload(self.mass, self.p_SoScm_S, self.g_W)
+
+    @property
     def weight_at_start(self) -> Array:
         """The payload's load on the sensor (..., 6) as an episode begins, in S."""
         standing = self.X_BS if self.X_GS is None else self.X_GS
@@ -86,8 +91,7 @@ class Mounting:
 
     def weight(self, R_GS: RotationMatrix | Array) -> Array:
         """Returns the payload's load on the sensor, (..., 6) [f; tau] at So in S."""
-        R_WS = self.R_WS(as_matrices(R_GS))
-        return weight_wrench(self.mass, self.p_SoScm_S, R_WS, self.g_W)
+        return self.payload.weight(self.R_WS(as_matrices(R_GS)))
 
 
 def _as_pose(X: RigidTransform | Pose) -> Pose:

@@ -20,7 +20,6 @@ from drake_disasm.cell.tool import summed
 from drake_disasm.cell.twin_parameters import TwinParameters, twin_of
 from drake_disasm.common.arrays import Array
 from drake_disasm.common.rotations import Pose
-from drake_disasm.devices.sensor_chain import Payload
 from drake_disasm.effects import Environment
 from drake_disasm.mdp import TaskGeometry, action_bounds
 from drake_disasm.parts.gaps import Gaps
@@ -96,12 +95,6 @@ class TwinNumbers:
             noise=np.array(scenario.ft_sensor.noise),
             quantum=np.array(scenario.ft_sensor.quantum),
         )
-
-    @property
-    def payload(self) -> Payload:
-        """What the sensor is known to carry."""
-        mounting = self.mounting
-        return Payload(mounting.mass, mounting.p_SoScm_S, mounting.g_W)
 
     @property
     def coordinates(self) -> BoltCoordinates:

@@ -98,7 +98,7 @@ class Twins:
         """
         numbers, mounting = self.numbers, self.numbers.mounting
         R_GS = mounting.from_bolt(numbers.coordinates.poses(arm[:, :6])).R
-        return numbers.payload.sensing(time, mounting.R_WS(R_GS))
+        return mounting.payload.sensing(time, mounting.R_WS(R_GS))
 
 
 def at_A(like: Array) -> BoltMotion:

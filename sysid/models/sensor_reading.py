@@ -13,7 +13,6 @@ from drake_disasm.cell.tool import Tool
 from drake_disasm.common.rotations import Pose
 from drake_disasm.common.spatial import shifted_wrench
 from drake_disasm.devices.sensor_chain import (
-    Payload,
     sensed_along,
     sensed_at_zeroing,
 )
@@ -90,7 +89,7 @@ class SensorReading:
         R_WG = nominal_groove_pose(scenario.placement).rotation().matrix()
         g_W = UniformGravityFieldElement().gravity_vector()
         self.mounting = Mounting(tool.X_SB, R_WG, *of_log, g_W, X_GS)
-        self.payload = Payload(*of_log, g_W)
+        self.payload = self.mounting.payload
         self._of_twin = Mounting(tool.X_SB, R_WG, *of_twin, g_W, X_GS).weight_at_start
 
     @classmethod

@@ -211,11 +211,8 @@ def test_a_gpu_simulates_the_same_episodes(batch):
 def test_a_sensor_under_the_part_reads_what_the_diagrams_does(name, settings):
     """What pulls on the bolt besides the part does not reach it."""
     scenario = load_scenario(name, [*SETTINGS, "ft_sensor.place=part", *settings])
-    pull, late = ef.ChainPull(fx=2.0), ef.SensorLag(0.05)
-    scenario, moves = (
-        dataclasses.replace(scenario, effects=[pull, late]),
-        actions(BEGIN),
-    )
+    effects, moves = [ef.ChainPull(fx=2.0), ef.SensorLag(0.05)], actions(BEGIN)
+    scenario = dataclasses.replace(scenario, effects=effects)
     expected, found = _diagram(scenario, moves), _batch([scenario], moves)[:, 0]
     assert np.linalg.norm(expected[:, 6:9], axis=1).max() > 0.5
     _assert_same(found, expected)

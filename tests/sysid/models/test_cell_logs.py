@@ -1,6 +1,7 @@
 """Logs of the cell, which the twin predicts to the noise and error that it states."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,18 +28,19 @@ _STEPS = 40
 def cell_log(tmp_path_factory) -> Log:
     """The first steps of an episode, half of which touch the groove."""
     scenario = load_scenario("removal", [f"task.steps={_STEPS}"])
+    return _recorded(tmp_path_factory.mktemp("cell") / "log", scenario)
+
+
+def _recorded(folder: Path, scenario: Scenario) -> Log:
     policy = Exploring(make_policy("admittance", scenario), 1.5e-4, 0)
     simulation = TaskSimulation(scenario, "cell", policy)
-    folder = tmp_path_factory.mktemp("cell") / "log"
     return record_transitions(folder, simulation, _STEPS)
 
 
 def test_the_twin_predicts_what_a_sensor_under_the_part_reads(tmp_path):
     """Which moving loads with nothing, and the weight of what is moved neither."""
     scenario = load_scenario("removal", ["ft_sensor.place=part"])
-    policy = Exploring(make_policy("admittance", scenario), 1.5e-4, 0)
-    simulation = TaskSimulation(scenario, "cell", policy)
-    log = record_transitions(tmp_path / "log", simulation, _STEPS)
+    log = _recorded(tmp_path / "log", scenario)
     residual = _residual(log, scenario)
     assert max(map(rms, residual.T)) < 1.2
     in_the_wrist = _residual(log, _SCENARIO)
