@@ -9,6 +9,8 @@ from drake_disasm.common.errors import DisasmError
 
 _STREAM = 0x4558504C  # separates it from sensor noise and imprecision
 _TURN = np.deg2rad(0.1) / 1e-3  # rad of rotation noise per m of translation noise
+#: Standard deviations (6,) of an action's noise, by that of a translation.
+AXIS_SHARES = np.array([1.0, 1.0, 1.0, _TURN, _TURN, _TURN])
 
 
 class Exploring:
@@ -38,7 +40,7 @@ class Exploring:
                 "noise is added; leave `explore` out, or give a callable"
             )
         self._policy, self._seed = policy, seed
-        self._deviation = deviation * np.array([1.0, 1.0, 1.0, _TURN, _TURN, _TURN])
+        self._deviation = deviation * AXIS_SHARES
         self._generator = np.random.default_rng([seed, _STREAM])
 
     def reset(self) -> None:

@@ -205,7 +205,7 @@ class TwinModel(SimulatedModel):
         own = [p for p in paths if p.startswith("contact.") and p != _FRICTION]
         if self._has_impact or self.rollout or own or self.scenario.part.gaps is None:
             return self
-        return self.replace(scenario=_with_impact_as_stiff(self.scenario))
+        return self.replace(scenario=with_impact_as_stiff(self.scenario))
 
     def with_begins(self, theta: Array | None) -> Self:
         """See LogModel: steps begin where the wrench says, without sensor effects.
@@ -456,7 +456,7 @@ def _kept(found: dict[str, _T], key: str, compute: Callable[[], _T]) -> _T:
     return found[key]
 
 
-def _with_impact_as_stiff(scenario: Scenario) -> Scenario:
+def with_impact_as_stiff(scenario: Scenario) -> Scenario:
     """Returns a scenario with IMPACT contact about as stiff as its hydroelastic one."""
     contact = scenario.contact
     most = find_field(scenario, "contact.impact.stiffness").metadata["high"]

@@ -23,7 +23,7 @@ from sysid.residuals.held_out import HeldOut
 
 Array = NDArray[np.float64]
 
-_BEFORE, AFTER, _MEASURED = "#9aa4ae", "#c03030", "#202020"
+_BEFORE, AFTER, MEASURED = "#9aa4ae", "#c03030", "#202020"
 PASSES, _FAILS, _MARK = "#2060a0", "#c8d0d8", "#d98c00"
 _ENDS = (("before", _BEFORE), ("after", AFTER))
 _SHOWN_VALUES = 48_000  # of a series over all channels: what keeps a page small
@@ -98,7 +98,7 @@ def error_plot(errors: HeldOut) -> Plot:
         spread = {"array": ends[1] - size, "arrayminus": size - ends[0]}
         bars = go.Bar(x=names, y=size, error_y=spread, name=label, marker_color=colour)
         figure.add_trace(bars)
-    figure.add_hline(y=1.0, line={"color": _MEASURED, "dash": "dash", "width": 1})
+    figure.add_hline(y=1.0, line={"color": MEASURED, "dash": "dash", "width": 1})
     figure.update_yaxes(title_text="rms error / noise", rangemode="tozero")
     finish(figure, 320)
     caption = "Over the rows above; the whiskers are 95 % intervals."
@@ -271,7 +271,7 @@ def _channel_series(
     dots = go.Scatter(
         x=x, y=shown(errors.measured[:, number]), name="measured",
         mode="markers" if len(rows) <= _SHOWN_DOTS else "lines",
-        marker={"color": _MEASURED, "size": 4}, line={"color": _MEASURED, "width": 2},
+        marker={"color": MEASURED, "size": 4}, line={"color": MEASURED, "width": 2},
     )  # fmt: skip
     return [(1, dots), *found]
 

@@ -33,6 +33,7 @@ COMMANDS = {
         "check-log": "check logs before anything is fitted to them",
         "identify": "find the parameters of a model, with intervals",
         "close-loop": "find which physical effect the model lacks, and add it",
+        "diagnose": "find it by the station's own experiments",
         "accept": "say whether to put a policy on the robot",
         "monitor": "watch a robot for changes, episode by episode",
     },

@@ -1,0 +1,154 @@
+"""Performing an experiment on a station, and what came of it."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
+from drake_disasm.experiments.base import Plan
+from drake_disasm.experiments.performer import Performer
+from drake_disasm.mdp import BoltState, Outcome
+from drake_disasm.scenario import Scenario
+from drake_disasm.stations import Station
+from drake_disasm.task.episode import Recorder
+from drake_disasm.task.simulation import StationFactory, StepResult, TaskSimulation
+from drake_disasm.twin.batch import BatchedTwin
+
+_FAILURES = (Outcome.FORCE_LIMIT, Outcome.TORQUE_LIMIT, Outcome.WORKSPACE)
+
+
+@dataclasses.dataclass(frozen=True)
+class Performance:
+    """What a station measured during an experiment.
+
+    Attributes:
+        observations: (n + 1, 12) states of the task.
+        actions: (n, 6) that the experiment asked for.
+        ended: why it was cut short; empty if it was performed whole.
+        period: of a step [s].
+    """
+
+    observations: np.ndarray
+    actions: np.ndarray
+    ended: str
+    period: float
+
+    @property
+    def duration(self) -> float:
+        """Robot time [s]."""
+        return (len(self.observations) - 1) * self.period
+
+    @property
+    def greatest(self) -> tuple[float, float]:
+        """Greatest force and torque on the bolt [N, N m]."""
+        state = BoltState.from_vector(self.observations)
+        return float(state.force.max()), float(state.torque.max())
+
+
+class Laboratory:
+    """A station on which one experiment after the other is performed.
+
+    Args:
+        scenario: of the station.
+        station: see TaskSimulation.
+    """
+
+    def __init__(self, scenario: Scenario, station: str | StationFactory) -> None:
+        self._performer = Performer()
+        self.simulation = TaskSimulation(scenario, station, self._performer)
+
+    @property
+    def station(self) -> Station:
+        """On which they are performed."""
+        return self.simulation.station
+
+    def perform(
+        self,
+        plan: Plan,
+        seed: int = 0,
+        recorder: Recorder | None = None,
+        progress: Progress = ignore_progress,
+    ) -> Performance:
+        """Performs an experiment, from where an episode begins.
+
+        Args:
+            plan: of it.
+            seed: of the sensor's noise.
+            recorder: gets every row, if given.
+            progress: gets each step.
+        """
+        simulation, performer = self.simulation, self._performer
+        performer.plan = plan
+        found, actions = [simulation.reset(seed)], []
+        if recorder:
+            recorder.measure()
+        while True:
+            result = simulation.step()
+            found.append(result.observation)
+            actions.append(simulation.action())
+            ended = _ended(result)
+            is_over = bool(ended) or performer.is_done
+            if recorder:
+                recorder.acted(_in_a_log(result, is_over))
+            update = f"{type(plan.experiment).__name__}"
+            progress(ProgressUpdate(update, len(found) - 1, plan.most_steps))
+            if is_over:
+                break
+        return Performance(np.array(found), np.array(actions), ended, plan.period)
+
+
+def perform_side_by_side(
+    scenarios: Sequence[Scenario], plans: Sequence[Plan]
+) -> list[list[Performance]]:
+    """Returns experiments on some twins, each in an environment of one batch.
+
+    Args:
+        scenarios: of the twins, with IMPACT contact, without noise.
+        plans: of experiments.
+
+    Returns:
+        For each twin all experiments.
+
+    Raises:
+        DisasmError: the batch does not have a scenario's effects or contact.
+    """
+    rows = [scenario for scenario in scenarios for _ in plans]
+    twin = BatchedTwin(rows, device="numpy")
+    performers = [Performer(plan) for _ in scenarios for plan in plans]
+    states = [twin.reset([0] * len(rows)).copy()]
+    actions: list[np.ndarray] = []
+    ended, steps = [""] * len(rows), np.zeros(len(rows), int)
+    running = np.ones(len(rows), bool)
+    while running.any():
+        pairs = zip(performers, states[-1], strict=True)
+        result = twin.step(np.array([act(state) for act, state in pairs]))
+        actions.append(twin.action.copy())
+        states.append(result.observation.copy())
+        steps += running
+        for i in np.flatnonzero(running).tolist():
+            outcome = Outcome(int(result.outcome[i]))
+            failure = outcome.label if outcome in _FAILURES else ""
+            ended[i] = result.failure[i] or failure
+            running[i] = not (ended[i] or performers[i].is_done)
+    table, asked = np.array(states), np.array(actions)
+    found = iter(
+        Performance(table[: n + 1, i], asked[:n, i], ended[i], twin.period)
+        for i, n in enumerate(steps.tolist())
+    )
+    return [[next(found) for _ in plans] for _ in scenarios]
+
+
+def _ended(result: StepResult) -> str:
+    """Returns why an experiment can't go on; that the bolt is out ends none."""
+    if not result.is_whole:
+        return "the station did not come to the step's end"
+    return result.outcome.label if result.outcome in _FAILURES else ""
+
+
+def _in_a_log(result: StepResult, is_over: bool) -> StepResult:
+    """Returns a step as the log has it: an episode ends with the experiment."""
+    outcome = Outcome.STEP_LIMIT if is_over else Outcome.RUNNING
+    if result.outcome in _FAILURES:
+        outcome = result.outcome
+    return dataclasses.replace(result, outcome=outcome)

@@ -1,0 +1,281 @@
+"""Which experiment separates rivals best, and whether it is safe under each of them.
+
+Each experiment is performed on the twin under each rival, for its safety. What rivals
+predict is compared under the same actions, those of the first, as a log's model is, and
+once more for each parameter that the log leaves uncertain. Two rivals are as far apart
+as what a station would measure differs, d, in standard deviations of the sensor's
+noise, of the model's own error and of what their parameters may still be (Box and Hill,
+"Discrimination among mechanistic models", 1967). A verdict tells them apart once one
+takes away enough more of the loss, d0^2. So whoever chooses between them errs with a
+probability of at most sqrt(w1 w2) exp(-2 (d / d0)^2), which with d0 = 4 is the bound of
+Kailath ("The divergence and Bhattacharyya distance measures in signal selection",
+1967). The best experiment takes most of that away per second of robot time.
+"""
+
+import dataclasses
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from drake_disasm.cell.coordinates import ArmCoordinates
+from drake_disasm.cell.placement import nominal_groove_pose
+from drake_disasm.cell.tool import Tool
+from drake_disasm.common.errors import DisasmError, DivergedError, UnreachableError
+from drake_disasm.common.progress import Progress, ProgressUpdate
+from drake_disasm.common.spatial import rotation_from_vector
+from drake_disasm.experiments import Plan, Replay
+from drake_disasm.experiments.performing import (
+    Laboratory,
+    Performance,
+    perform_side_by_side,
+)
+from drake_disasm.scenario import Scenario
+from drake_disasm.twin.steps import noise_free
+from sysid.diagnosis.rivals import Rival
+from sysid.models.base import Array
+from sysid.models.transitions import FORCE_ERROR, POSE_NOISE
+from sysid.models.twin import with_impact_as_stiff
+
+_MARGIN = 0.7  # of the greatest force and torque that a task allows
+_LEVER = 0.02  # m, at which an error of the force turns the bolt
+
+
+@dataclasses.dataclass(frozen=True)
+class Prediction:
+    """What rivals predict of an experiment.
+
+    Attributes:
+        plan: of the experiment.
+        performances: of each rival, on the twin.
+        replayed: of each rival, with the actions of the first rival's.
+        distances: (k, k) between rivals, in standard deviations.
+        sigma: (12,) by which a measured state may differ anyway.
+        hazard: why it is not performed, in words; empty if it may be.
+        needed: distance at which a verdict tells two rivals apart.
+        value: error probability that it takes away, per second.
+    """
+
+    plan: Plan
+    performances: tuple[Performance, ...]
+    replayed: tuple[Performance, ...]
+    distances: Array
+    sigma: Array
+    hazard: str
+    needed: float
+    value: float
+
+    @property
+    def duration(self) -> float:
+        """Robot time under the rival that takes longest [s]."""
+        return max(each.duration for each in self.performances)
+
+    @property
+    def channel(self) -> int:
+        """Number of the state's channel in which rivals differ most."""
+        steps = min(len(each.observations) for each in self.replayed)
+        states = np.array([each.observations[:steps] for each in self.replayed])
+        return int(np.argmax(np.sum(np.ptp(states / self.sigma, axis=0) ** 2, axis=0)))
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether a verdict would then tell two rivals apart, one way or another."""
+        return not self.hazard and self.farthest >= self.needed
+
+    @property
+    def farthest(self) -> float:
+        """Distance of the two rivals that it separates best."""
+        return float(self.distances.max(initial=0.0))
+
+
+def predict(
+    plans: Sequence[Plan],
+    rivals: Sequence[Rival],
+    needed: float,
+    progress: Progress,
+) -> list[Prediction]:
+    """Returns what rivals predict of experiments, the best first.
+
+    Args:
+        plans: experiments on the rivals' scenario.
+        rivals: at least two.
+        needed: distance at which a verdict tells two rivals apart, d0.
+        progress: gets each simulation.
+    """
+    led = [
+        _performed(plans, [rival.scenario], rival.name, progress) for rival in rivals
+    ]
+    replays = [
+        Plan(plan.experiment, (Replay(one.actions),), plan.period)
+        for plan, one in zip(plans, led[0][0], strict=True)
+    ]
+    replayed = [
+        _performed(replays, (rival.scenario, *rival.varied), rival.name, progress)
+        for rival in rivals
+    ]
+    weights = np.array([rival.weight for rival in rivals])
+    sigma, reach = _sigma(rivals[0].scenario), _Reach(rivals[0].scenario)
+    found = []
+    for number, plan in enumerate(plans):
+        done = tuple(own[0][number] for own in led)
+        same = [[twin[number] for twin in own] for own in replayed]
+        duration = max(each.duration for each in done)
+        distances = _distances(same, sigma)
+        hazard = _hazard(done, rivals, reach)
+        gain = 0.0 if hazard else _gain(distances / needed, weights)
+        value = gain / max(duration, plan.period)
+        shown = tuple(own[0] for own in same)
+        found.append(
+            Prediction(plan, done, shown, distances, sigma, hazard, needed, value)
+        )
+    return sorted(found, key=lambda each: -each.value)
+
+
+def _performed(
+    plans: Sequence[Plan],
+    scenarios: Sequence[Scenario],
+    name: str,
+    progress: Progress,
+) -> list[list[Performance]]:
+    """Returns experiments on each of a rival's twins.
+
+    All at once with IMPACT contact, as stiff as the rival's, if it has such a form.
+    """
+    progress(ProgressUpdate(f"predicting: {name}", 0, len(plans)))
+    twins = [noise_free(each) for each in scenarios]
+    try:
+        return perform_side_by_side([as_batch(each) for each in twins], plans)
+    except DisasmError:  # an effect or a part that the batch does not have
+        return [_one_by_one(plans, each, name, progress) for each in twins]
+
+
+def _one_by_one(
+    plans: Sequence[Plan], scenario: Scenario, name: str, progress: Progress
+) -> list[Performance]:
+    """Returns each experiment on the diagram's twin."""
+    laboratory, found = Laboratory(scenario, "twin"), []
+    for number, plan in enumerate(plans):
+        progress(ProgressUpdate(f"predicting: {name}", number, len(plans), plan.text))
+        try:
+            found.append(laboratory.perform(plan))
+        except (DivergedError, UnreachableError) as error:
+            nothing = np.zeros((1, 12)), np.zeros((0, 6))
+            found.append(Performance(*nothing, str(error), plan.period))
+    return found
+
+
+def _sigma(scenario: Scenario) -> Array:
+    """Returns the standard deviations (12,) of what a state would differ by anyway."""
+    sensor = scenario.ft_sensor
+    noise = np.hypot(sensor.noise, np.array(sensor.quantum) / np.sqrt(12.0))
+    force = np.hypot(noise[:3].max(), FORCE_ERROR[0])
+    torque = np.hypot(noise[3:].max(), _LEVER * FORCE_ERROR[0])
+    m, rad = POSE_NOISE
+    return np.repeat([m, rad, force, torque], 3)
+
+
+def _distances(of_rivals: Sequence[Sequence[Performance]], sigma: Array) -> Array:
+    """Returns how far rivals are apart (k, k), over the steps that all have.
+
+    With the covariance 1 + J J^T of what is measured, in units of sigma: J is how it
+    changes with each rival's parameters, by a standard deviation of each.
+
+    Args:
+        of_rivals: of each its own performance, and one for each parameter.
+        sigma: (12,) of a state.
+    """
+    steps = min(len(each.observations) for own in of_rivals for each in own)
+    whitened = [
+        np.array([(each.observations[:steps] / sigma).ravel() for each in own])
+        for own in of_rivals
+    ]
+    found = np.zeros((len(whitened), len(whitened)))
+    for i, j in itertools.combinations(range(len(whitened)), 2):
+        (one, *more), (other, *others) = whitened[i], whitened[j]
+        columns = [x - one for x in more] + [x - other for x in others]
+        found[i, j] = found[j, i] = mahalanobis(one - other, np.array(columns))
+    return found
+
+
+def mahalanobis(away: Array, columns: Array) -> float:
+    """Returns the length of a vector (n,) with the covariance 1 + J J^T.
+
+    By Woodbury's identity.
+
+    Args:
+        away: the vector.
+        columns: (p, n), the transpose of J.
+    """
+    squared = float(away @ away)
+    if len(columns):
+        inner = np.eye(len(columns)) + columns @ columns.T
+        along = columns @ away
+        squared -= float(along @ np.linalg.solve(inner, along))
+    return float(np.sqrt(max(squared, 0.0)))
+
+
+def _gain(distances: Array, weights: Array) -> float:
+    """Returns by how much an experiment lowers the bound on the error probability.
+
+    Args:
+        distances: (k, k) between rivals, as shares of d0.
+        weights: (k,).
+    """
+    pairs = itertools.combinations(range(len(weights)), 2)
+    return float(
+        sum(
+            np.sqrt(weights[i] * weights[j]) * -np.expm1(-2.0 * distances[i, j] ** 2)
+            for i, j in pairs
+        )
+    )
+
+
+def _hazard(
+    done: Sequence[Performance], rivals: Sequence[Rival], reach: "_Reach"
+) -> str:
+    """Returns why an experiment is not safe under every rival; empty if it is."""
+    reward = rivals[0].scenario.task.reward
+    for each, rival in zip(done, rivals, strict=True):
+        force, torque = each.greatest
+        if each.ended:
+            return f"under {rival.name} it ends by {each.ended}"
+        if force > _MARGIN * reward.f_max or torque > _MARGIN * reward.t_max:
+            return (
+                f"under {rival.name} it presses by {force:.1f} N and {torque:.2f} N m, "
+                f"above {100 * _MARGIN:.0f} % of what the task allows"
+            )
+        if beyond := reach.beyond(each.observations):
+            return f"under {rival.name} {beyond}"
+    return ""
+
+
+def as_batch(scenario: Scenario) -> Scenario:
+    """Returns a scenario with IMPACT contact, as stiff as its own."""
+    if scenario.contact.model == "impact" or scenario.part.gaps is None:
+        return scenario
+    return with_impact_as_stiff(scenario)
+
+
+class _Reach:
+    """Whether the arm gets everywhere within its joint limits.
+
+    Args:
+        scenario: of the arm.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        X_FB = Tool.from_models(scenario).X_FB
+        X_WG = nominal_groove_pose(scenario.placement)
+        self._arm = ArmCoordinates(scenario.arm, X_WG, X_FB, scenario.task.period)
+
+    def beyond(self, observations: Array) -> str:
+        """Returns where it doesn't, in words; empty if it does."""
+        q = self._arm.start(RigidTransform())
+        try:
+            for x in observations:
+                R_GB = rotation_from_vector(x[3:6])
+                q = self._arm.solve(RigidTransform(R_GB, x[:3]), q)
+        except DisasmError as error:
+            return str(error)
+        return ""

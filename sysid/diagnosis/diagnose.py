@@ -1,0 +1,399 @@
+"""Verdict, rivals, the experiment that separates them, and the verdict again."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import make_folder, read_json, write_json
+from drake_disasm.common.progress import Progress, ignore_progress
+from drake_disasm.experiments import Experiment, Plan, Removal, registered_experiments
+from drake_disasm.experiments.performing import Laboratory, Performance
+from drake_disasm.logs import LogWriter, read_log
+from drake_disasm.logs.columns import flat_columns
+from drake_disasm.mdp import STATE_NAMES
+from drake_disasm.scenario import Scenario, scenario_to_mapping
+from drake_disasm.task.recording import EpisodeRecorder, transitions_header
+from drake_disasm.task.simulation import StationFactory
+from sysid.diagnosis.design import Prediction, predict
+from sysid.diagnosis.rivals import NOTHING, Rival, needed_distance, rivals_of
+from sysid.effect_selection.close_loop import ClosedLoop, close_loop
+from sysid.models.base import LogModel
+from sysid.models.from_logs import ModelChoice, model_of
+from sysid.workers import Workers
+
+_FIRST = 3  # removals before the first verdict
+
+#: Is asked before each experiment, with what it is; False ends the diagnosis.
+Confirm = Callable[[str], bool]
+
+
+@dataclasses.dataclass(frozen=True)
+class Budget:
+    """How much a diagnosis may cost.
+
+    Attributes:
+        robot: time of the robot [s].
+        verdict: time of the computer for each verdict [s].
+    """
+
+    robot: float = 300.0
+    verdict: float = math.inf
+
+
+@dataclasses.dataclass(frozen=True)
+class Round:
+    """A verdict, and what was done about it.
+
+    Attributes:
+        verdict: in a sentence.
+        names: effects that it names.
+        rivals: weights of the hypotheses, by name.
+        experiment: that was performed then, with its parameters; empty for none.
+        distance: by which it was to separate the two rivals that it separates best, in
+            standard deviations.
+        force, torque: greatest in it [N, N m].
+        ended: why it was cut short; empty if it was performed whole.
+        robot_time: of it [s].
+        channel: of the state, in which rivals differ most there.
+        predicted: by each rival, in that channel, by name, step by step (n + 1,).
+        measured: (m + 1,) in that channel.
+    """
+
+    verdict: str
+    names: tuple[str, ...]
+    rivals: dict[str, float]
+    experiment: str = ""
+    distance: float = 0.0
+    force: float = 0.0
+    torque: float = 0.0
+    ended: str = ""
+    robot_time: float = 0.0
+    channel: str = ""
+    predicted: dict[str, list[float]] = dataclasses.field(default_factory=dict)
+    measured: list[float] = dataclasses.field(default_factory=list)
+
+
+@dataclasses.dataclass(frozen=True)
+class Diagnosis:
+    """What came of it.
+
+    Attributes:
+        rounds: in their order; the last has no experiment.
+        reason: why it ended, in a sentence.
+        closed: the last verdict.
+        first_time: robot time before the first verdict [s].
+        predictions: of the last round's experiments, the best first.
+        rivals: of the last round.
+    """
+
+    rounds: tuple[Round, ...]
+    reason: str
+    closed: ClosedLoop
+    first_time: float
+    predictions: tuple[Prediction, ...]
+    rivals: tuple[Rival, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Effects that the last verdict confirms."""
+        return self.closed.verdict.confirmed
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether one hypothesis is left."""
+        return len(self.rivals) == 1
+
+    @property
+    def robot_time(self) -> float:
+        """Of all experiments [s]."""
+        return self.first_time + sum(each.robot_time for each in self.rounds)
+
+
+def diagnose(
+    scenario: Scenario,
+    folder: Path,
+    *,
+    station: str | StationFactory = "cell",
+    real: Scenario | None = None,
+    budget: Budget = Budget(),
+    library: Sequence[type[Experiment]] | None = None,
+    confirm: Confirm = lambda _: True,
+    workers: Workers | None = None,
+    progress: Progress = ignore_progress,
+) -> Diagnosis:
+    """Finds out what a scenario's model lacks, by experiments on a station.
+
+    Records some removals, asks for the verdict, performs the experiment that separates
+    best what the verdict leaves, adds it to the log, and asks again, until one
+    hypothesis is left, no experiment would help, or the budget is spent. The same call
+    goes on where it was stopped.
+
+    Args:
+        scenario: of the model, which the log states.
+        folder: of the log, the fits and `diagnosis.json`.
+        station: "cell", "twin", or what makes the hardware's.
+        real: scenario of a simulated station; the model's if left out.
+        budget: after which no experiment begins.
+        library: experiments; all registered ones if left out.
+        confirm: is asked before each experiment.
+        workers: fit.
+        progress: gets each step.
+
+    Raises:
+        DisasmError: the budget is too small for a first recording, the folder holds
+            another scenario's, or what close_loop and the station raise.
+    """
+    workers = workers or Workers()
+    session = _Session(scenario, folder, station, real or scenario, progress)
+    session.record_first(budget, confirm)
+    plans = _plans(scenario, library)
+    while True:
+        closed, model = session.verdict(workers, budget.verdict)
+        rivals = rivals_of(closed, model, workers, folder / "fits")
+        predictions = session.predict(plans, rivals, needed_distance(closed))
+        left = budget.robot - session.robot_time
+        best, reason = _choice(closed, rivals, predictions, left)
+        if best is not None and not confirm(_question(best)):
+            best, reason = None, "stopped by hand; the same command goes on from here"
+        if best is None:
+            session.close(closed, rivals, reason)
+            return Diagnosis(
+                tuple(session.rounds),
+                reason,
+                closed,
+                session.first_time,
+                tuple(predictions),
+                rivals,
+            )
+        session.experiment(closed, rivals, best)
+
+
+def _plans(
+    scenario: Scenario, library: Sequence[type[Experiment]] | None
+) -> list[Plan]:
+    """Returns all experiments of a library that a scenario has anything to do with."""
+    kinds = registered_experiments() if library is None else library
+    kinds = [kind for kind in kinds if kind is not Removal]
+    plans = [e.plan(scenario) for kind in kinds for e in kind.variants()]
+    return [plan for plan in plans if plan.phases]
+
+
+def _choice(
+    closed: ClosedLoop,
+    rivals: Sequence[Rival],
+    predictions: Sequence[Prediction],
+    left: float,
+) -> tuple[Prediction | None, str]:
+    """Returns the experiment to perform, or why there is none.
+
+    Args:
+        closed: the verdict.
+        rivals: that it leaves.
+        predictions: of experiments that were not performed yet, the best first.
+        left: robot time [s].
+    """
+    if len(rivals) < 2:
+        return None, _settled(closed)
+    safe = [p for p in predictions if p.is_enough]
+    if not safe:
+        return None, _inseparable(rivals, predictions)
+    affordable = [p for p in safe if p.duration <= left]
+    if not affordable:
+        return None, (
+            f"the budget is spent: {left:.0f} s are left, and the shortest experiment "
+            f"that helps takes {min(p.duration for p in safe):.0f} s"
+        )
+    return affordable[0], ""
+
+
+def _settled(closed: ClosedLoop) -> str:
+    """Returns why a single hypothesis ends a diagnosis."""
+    if closed.verdict.ending == "unexplained":
+        return "what the model lacks is not in the library"
+    names = " and ".join(closed.verdict.confirmed) or NOTHING
+    return f"settled: the model lacks {names}"
+
+
+def _inseparable(rivals: Sequence[Rival], predictions: Sequence[Prediction]) -> str:
+    """Returns why no experiment is performed, with the proof."""
+    names = " and ".join(rival.name for rival in rivals[:2])
+    safe = [p for p in predictions if not p.hazard]
+    if not safe:
+        first = next((p.hazard for p in predictions), "there is no experiment")
+        return f"no experiment is safe: {first}"
+    most = max(safe, key=lambda p: p.farthest)
+    return (
+        f"no experiment separates {names}: the largest difference that any predicts is "
+        f"{most.farthest:.1f} standard deviations, of {most.plan.text}, and the "
+        f"verdict needs {most.needed:.1f}"
+    )
+
+
+def _question(best: Prediction) -> str:
+    """Returns what a person is asked before an experiment."""
+    force = max(each.greatest[0] for each in best.performances)
+    return (
+        f"{best.plan.text}: {best.duration:.0f} s, at most {force:.1f} N under any "
+        "hypothesis"
+    )
+
+
+class _Session:
+    """A folder with a log that grows, and what is known of it.
+
+    Attributes:
+        rounds: so far.
+        first_time: robot time before the first verdict [s].
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        folder: Path,
+        station: str | StationFactory,
+        real: Scenario,
+        progress: Progress,
+    ) -> None:
+        self._scenario, self._folder = scenario, folder
+        self._progress = progress
+        self._laboratory = Laboratory(real, station)
+        make_folder(folder)
+        self._file = folder / "diagnosis.json"
+        self.rounds: list[Round] = []
+        self.first_time = 0.0
+        self._read()
+        header = transitions_header(
+            scenario, self._laboratory.station.kind, {"program": "diagnose"}
+        )
+        self._writer = LogWriter(folder / "log", header, resume=True)
+
+    @property
+    def robot_time(self) -> float:
+        """Used so far [s]."""
+        return self.first_time + sum(each.robot_time for each in self.rounds)
+
+    def record_first(self, budget: Budget, confirm: Confirm) -> None:
+        """Records removals, if the log has none."""
+        for number in range(self._writer.next_number, _FIRST):
+            plan = Removal(seed=number).plan(self._scenario)
+            if self.first_time > budget.robot:
+                raise DisasmError(
+                    f"budget: {budget.robot:g} s are spent before the first verdict; "
+                    "give more"
+                )
+            most = plan.most_steps * plan.period
+            if not confirm(f"{plan.text}: at most {most:.0f} s"):
+                raise DisasmError("stopped by hand before the first verdict")
+            self.first_time += self._perform(plan).duration
+            self._write("")
+
+    def verdict(
+        self, workers: Workers, time_budget: float
+    ) -> tuple[ClosedLoop, LogModel]:
+        """Returns the verdict on the log so far, and the model of it.
+
+        Every episode is fitted, contiguous blocks are held out in turn: an experiment
+        is made to be learned from.
+        """
+        log = read_log(self._folder / "log")
+        choice = ModelChoice(scenario=self._scenario, fixed=True)
+        model = model_of([log], choice)
+        closed = close_loop(
+            model,
+            train=range(len(log.episodes)),
+            test=(),
+            workers=workers,
+            progress=self._progress,
+            folder=self._folder / "fits",
+            time_budget=time_budget,
+        )
+        return closed, model
+
+    def predict(
+        self, plans: Sequence[Plan], rivals: Sequence[Rival], needed: float
+    ) -> list[Prediction]:
+        """Returns what rivals predict of experiments that were not performed yet."""
+        if len(rivals) < 2:
+            return []
+        done = {each.experiment for each in self.rounds}
+        left = [plan for plan in plans if plan.text not in done]
+        return predict(left, rivals, needed, self._progress)
+
+    def experiment(
+        self, closed: ClosedLoop, rivals: Sequence[Rival], chosen: Prediction
+    ) -> None:
+        """Performs an experiment and adds it to the log."""
+        found = self._perform(chosen.plan)
+        (force, torque), i = found.greatest, chosen.channel
+        pairs = zip(rivals, chosen.replayed, strict=True)
+        self.rounds.append(
+            dataclasses.replace(
+                _round(closed, rivals),
+                experiment=chosen.plan.text,
+                distance=chosen.farthest,
+                force=force,
+                torque=torque,
+                ended=found.ended,
+                robot_time=found.duration,
+                channel=STATE_NAMES[i],
+                predicted={r.name: p.observations[:, i].tolist() for r, p in pairs},
+                measured=found.observations[:, i].tolist(),
+            )
+        )
+        self._write("")
+
+    def close(self, closed: ClosedLoop, rivals: Sequence[Rival], reason: str) -> None:
+        """Notes the last verdict, which has no experiment, and why it is the last."""
+        self.rounds.append(_round(closed, rivals))
+        self._write(reason)
+
+    def _perform(self, plan: Plan) -> Performance:
+        """Performs an experiment; what was recorded is kept if the station holds."""
+        number, laboratory = self._writer.next_number, self._laboratory
+        if laboratory.station.kind == "hardware":
+            with self._writer.begin_episode() as episode:
+                recorder = EpisodeRecorder(laboratory.simulation, episode)
+                return laboratory.perform(plan, number, recorder, self._progress)
+        recorder = EpisodeRecorder(laboratory.simulation)
+        found = laboratory.perform(plan, number, recorder, self._progress)
+        self._writer.write_episode(flat_columns("transitions", recorder.columns()))
+        return found
+
+    def _read(self) -> None:
+        """Takes up what an earlier call has done.
+
+        Raises:
+            DisasmError: it was of another scenario.
+        """
+        if not self._file.exists():
+            return
+        known: dict[str, Any] = read_json(
+            self._file, "name another folder", {"scenario": {}, "rounds": []}
+        )
+        if known["scenario"] != scenario_to_mapping(self._scenario):
+            raise DisasmError(
+                f"{self._file}: is of another scenario; give it, or another folder"
+            )
+        self.first_time = float(known["first_time"])
+        for each in known["rounds"]:
+            if each["experiment"]:
+                self.rounds.append(Round(**each | {"names": tuple(each["names"])}))
+
+    def _write(self, reason: str) -> None:
+        write_json(
+            self._file,
+            {
+                "scenario": scenario_to_mapping(self._scenario),
+                "first_time": self.first_time,
+                "rounds": [dataclasses.asdict(each) for each in self.rounds],
+                "reason": reason,
+            },
+        )
+
+
+def _round(closed: ClosedLoop, rivals: Sequence[Rival]) -> Round:
+    weights = {rival.name: rival.weight for rival in rivals}
+    return Round(closed.sentence, closed.verdict.names, weights)

@@ -1,0 +1,193 @@
+"""The hypotheses that a verdict leaves: what the model may lack, each fitted."""
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from drake_disasm.effects import Effect
+from drake_disasm.scenario import Scenario
+from sysid.effect_selection.close_loop import ClosedLoop
+from sysid.effect_selection.detection import DetectionLimit
+from sysid.effect_selection.effect_names import effect_class
+from sysid.fitting.candidates import Candidate, candidates
+from sysid.fitting.fit import Fit
+from sysid.fitting.fitter import Fitter
+from sysid.models.base import LogModel
+from sysid.parameters import Scaling
+from sysid.workers import Workers
+
+#: What the hypothesis is called that the model lacks nothing (more).
+NOTHING = "nothing"
+
+_BY_CHANCE = 5.0  # standard deviations
+_LEAST = 1e-4  # weight of a hypothesis that the log speaks against
+_DRAWS = 2000  # of folds: a weight of a half is then known to a hundredth
+_OF_BOUND = 0.5  # of an amplitude that no size within its bounds would have shown
+_TIMES = 2.0  # the size that would have been found
+_NORMAL = 1.96  # standard deviations of a 95 % interval
+_MOST = 6  # hypotheses about what a log could not have shown
+
+
+@dataclasses.dataclass(frozen=True)
+class Rival:
+    """A hypothesis.
+
+    Attributes:
+        name: of its effects, or NOTHING.
+        scenario: the model with them, fitted.
+        weight: share of draws of the log's folds in which it predicts held-out rows
+            best; of those that the verdict can't tell apart the mean of that and of the
+            same for each; of what the log could not have shown, the same for each.
+        varied: the scenario with one parameter of its effects changed by a standard
+            deviation, one after the other.
+    """
+
+    name: str
+    scenario: Scenario
+    weight: float
+    varied: tuple[Scenario, ...] = ()
+
+
+def rivals_of(
+    closed: ClosedLoop, model: LogModel, workers: Workers, folder: Path | None = None
+) -> tuple[Rival, ...]:
+    """Returns the hypotheses that are left; one alone is settled.
+
+    Args:
+        closed: the verdict.
+        model: of the whole log.
+        workers: fit.
+        folder: of a cache of fits.
+    """
+    verdict = closed.verdict
+    if not (verdict.ambiguous or verdict.suggested):
+        return _unseen(closed)
+    delta = model.default_huber_delta
+    fitter = Fitter.of(model, workers, delta, closed.last.settings, folder)
+    sets = list(_sets(closed, candidates(model)))
+    fits = [fitter.fit(effects, _start(closed.last, effects)) for effects, _ in sets]
+    shares = best_of_folds([fit.held_out_losses for fit in fits])
+    equal = 1.0 / sum(is_ambiguous for _, is_ambiguous in sets)
+    found = []
+    for (effects, is_ambiguous), fit, share in zip(
+        sets, fits, shares.tolist(), strict=True
+    ):
+        scenario = fit.model.scenario_at(fit.theta)
+        if scenario is not None:
+            name = " and ".join(e.name for e in effects) or NOTHING
+            weight = 0.5 * (share + equal) if is_ambiguous else max(share, _LEAST)
+            found.append(Rival(name, scenario, weight, tuple(_varied(fit))))
+    return tuple(sorted(found, key=lambda rival: -rival.weight))
+
+
+def needed_distance(closed: ClosedLoop) -> float:
+    """Returns how far apart two rivals have to be for a verdict to tell them apart [1].
+
+    One has to take away as much more of the loss as the margin of ambiguity asks
+    (`Gain.is_about_as_good_as`), and more than chance.
+    """
+    left = closed.last.loss
+    taken = max(closed.first.loss - left, 0.0)
+    margin = closed.last.settings.ambiguity_margin * min(taken, left)
+    return max(_BY_CHANCE, float(np.sqrt(margin)))
+
+
+def _varied(fit: Fit) -> Iterator[Scenario]:
+    """Yields a fit's scenario with one parameter of its effects changed."""
+    scaling, u = Scaling(fit.model.parameters), fit.linearisation.u
+    sigma = (fit.half_intervals + fit.error_of_model) / _NORMAL
+    for i in range(len(u)):
+        moved = u.copy()
+        moved[i] += sigma[i] if u[i] + sigma[i] <= 1.0 else -sigma[i]
+        scenario = fit.model.scenario_at(scaling.from_unit(np.clip(moved, 0.0, 1.0)))
+        if scenario is not None and np.isfinite(sigma[i]):
+            yield scenario
+
+
+def best_of_folds(losses: Sequence[np.ndarray], seed: int = 0) -> np.ndarray:
+    """Returns how often each of k hypotheses is the best (k,), over draws of folds.
+
+    Args:
+        losses: of each, (F,) of the held-out folds.
+        seed: of the draws (bootstrap, Efron 1979).
+    """
+    table = np.array(losses)
+    random = np.random.default_rng(seed)
+    drawn = random.integers(table.shape[1], size=(_DRAWS, table.shape[1]))
+    best = np.argmin(table[:, drawn].sum(axis=2), axis=0)
+    return np.bincount(best, minlength=len(table)) / _DRAWS
+
+
+def _start(fit: Fit, effects: Sequence[Candidate]) -> Fit | None:
+    """Returns where a fit begins: where the last one ended, if it has its effects."""
+    kept = {effect.name for effect in effects}
+    return fit if all(e.name in kept for e in fit.effects) else None
+
+
+def _sets(
+    closed: ClosedLoop, library: Sequence[Candidate]
+) -> Iterator[tuple[tuple[Candidate, ...], bool]]:
+    """Yields sets of effects that are left, the verdict's first.
+
+    And whether the verdict can't tell each from its own.
+    """
+    chosen = closed.last.effects
+    yield chosen, True
+    for standing in closed.verdict.standings:
+        rest = tuple(e for e in chosen if e.name != standing.name)
+        if standing.status == "suggested":
+            yield rest, False
+        for names in standing.rivals:
+            yield (*rest, *(_shaped(closed, name, library) for name in names)), True
+
+
+def _shaped(closed: ClosedLoop, name: str, library: Sequence[Candidate]) -> Candidate:
+    """Returns an effect in the shape that gained most, all its amplitudes free."""
+    for gain in closed.search.begin:
+        for candidate in gain.term.candidates:
+            if candidate.name == name:
+                return Candidate.of(candidate.effect)
+    return next(each for each in library if each.name == name)
+
+
+def _unseen(closed: ClosedLoop) -> tuple[Rival, ...]:
+    """Returns the verdict, and what its log could not have shown, each as a rival."""
+    scenario = closed.scenario
+    if scenario is None:
+        return ()
+    known = " and ".join(closed.verdict.confirmed) or NOTHING
+    hidden = sorted(closed.verdict.undetectable)[:_MOST]
+    rivals = [Rival(known, scenario, 1.0 / (1 + len(hidden)))]
+    for kind in hidden:
+        effect = _of_size(kind, closed.verdict.limits)
+        if effect is not None:
+            more = dataclasses.replace(scenario, effects=[*scenario.effects, effect])
+            name = kind if known == NOTHING else f"{known} and {kind}"
+            rivals.append(Rival(name, more, rivals[0].weight))
+    return tuple(rivals)
+
+
+def _of_size(kind: str, limits: Sequence[DetectionLimit]) -> Effect | None:
+    """Returns an effect that a log could not have shown, of a size that matters.
+
+    In the field and shape that it would have shown soonest: half of its bound, or twice
+    of what would have been found.
+    """
+    made = effect_class(kind)
+    if made is None:
+        return None
+    fields = {field.name for field in dataclasses.fields(made)}
+    own = [x for x in limits if x.effect == kind and x.field in fields]
+    if not own:
+        return None
+    best = min(own, key=lambda limit: limit.share)
+    field = next(f for f in dataclasses.fields(made) if f.name == best.field)
+    high = field.metadata["high"]
+    size = _OF_BOUND * high
+    if best.amplitude is not None:
+        size = math.copysign(min(_TIMES * abs(best.amplitude), size), size)
+    pairs = (part.split("=") for part in best.shape.split(", ") if part)
+    return made(**{best.field: size}, **{name: float(v) for name, v in pairs})

@@ -1,0 +1,46 @@
+"""The story of a diagnosis: what was left, what was done about it, what came out."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import plotly.graph_objects as go
+
+from sysid.diagnosis import Diagnosis, Round
+from sysid.report.plots import MEASURED, Plot, finish
+from sysid.report.templates import render
+
+_HEIGHT = 280  # pixels
+_UNITS = [*["m"] * 3, *["rad"] * 3, "N", "N m"]  # of x y z u v w f t
+
+
+def diagnosis_page(found: Diagnosis, origin: Mapping[str, Any]) -> str:
+    """Returns the report as one self-contained HTML page.
+
+    Args:
+        found: the diagnosis.
+        origin: provenance.
+    """
+    plots = [experiment_plot(r) if r.experiment else None for r in found.rounds]
+    rounds = list(zip(found.rounds, plots, strict=True))
+    return render("story.html.j2", found=found, rounds=rounds, origin=origin)
+
+
+def experiment_plot(one: Round) -> Plot:
+    """Returns what each rival predicted of an experiment, and what was measured."""
+    figure, period = go.Figure(), one.robot_time / max(1, len(one.measured) - 1)
+    for name, values in one.predicted.items():
+        figure.add_trace(go.Scatter(y=values, dx=period, mode="lines", name=name))
+    figure.add_trace(
+        go.Scatter(
+            y=one.measured,
+            dx=period,
+            mode="markers",
+            marker={"color": MEASURED, "size": 4},
+            name="measured",
+        )
+    )
+    unit = dict(zip("xyzuvwft", _UNITS, strict=True))[one.channel[0]]
+    figure.update_xaxes(title_text="time [s]")
+    figure.update_yaxes(title_text=f"{one.channel} [{unit}]")
+    finish(figure, _HEIGHT)
+    return Plot(figure, "In the channel in which the hypotheses differ most.")

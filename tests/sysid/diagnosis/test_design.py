@@ -1,0 +1,73 @@
+"""Which experiment is chosen, and that it is safe."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from drake_disasm.common.progress import ignore_progress
+from drake_disasm.effects import GroovePose, SensorBias, SensorDrift, SensorWarmUp
+from drake_disasm.experiments import Presses, Rest, Reversals
+from drake_disasm.scenario import load_scenario
+from sysid.diagnosis.design import mahalanobis, predict
+from sysid.diagnosis.rivals import Rival, best_of_folds
+
+IMPACT = load_scenario("removal", ["contact.model=impact"])
+
+
+def rival(name: str, *effects: object, **more: object) -> Rival:
+    return Rival(name, dataclasses.replace(IMPACT, effects=list(effects)), 0.5, **more)
+
+
+def test_a_distance_counts_only_what_parameters_can_not_make_up() -> None:
+    away = np.array([3.0, 4.0, 0.0])
+    assert mahalanobis(away, np.zeros((0, 3))) == 5.0
+    columns = np.array([[100.0, 0.0, 0.0]])
+    covariance = np.eye(3) + columns.T @ columns
+    expected = np.sqrt(away @ np.linalg.solve(covariance, away))
+    assert mahalanobis(away, columns) == pytest.approx(expected, rel=1e-9)
+    assert mahalanobis(away, columns) == pytest.approx(4.0, abs=1e-3)
+
+
+def test_the_better_of_most_folds_has_the_weight() -> None:
+    even = np.array([1.0, 2.0, 1.0, 2.0])
+    np.testing.assert_allclose(best_of_folds([even, even + 0.1]), [1.0, 0.0])
+    one, other = best_of_folds([even, even[::-1]])
+    assert one + other == 1.0 and 0.3 < one < 0.8
+
+
+def test_a_drift_and_a_settling_reading_are_told_apart_by_waiting() -> None:
+    """Pressing tells no more in its time: neither depends on the load."""
+    rivals = [
+        rival("drift", SensorDrift(fz=0.05)),
+        rival("warm-up", SensorWarmUp(fz=1.0, time_constant=10.0)),
+    ]
+    plans = [Rest(20.0).plan(IMPACT), Presses("z", 2.0, 1).plan(IMPACT)]
+    found = {p.plan.text: p for p in predict(plans, rivals, 5.0, ignore_progress)}
+    rest, press = (found[plan.text] for plan in plans)
+    assert rest.farthest > press.farthest > 0.0
+    assert rest.channel == 7 and rest.hazard == ""  # z of S is y of G
+
+
+def test_what_fits_may_make_up_is_no_difference() -> None:
+    """A bias of another size is the same hypothesis."""
+    known, other = rival("one", SensorBias(fz=0.5)), rival("other", SensorBias(fz=0.8))
+    varied = dataclasses.replace(IMPACT, effects=[SensorBias(fz=0.8)])
+    loose = dataclasses.replace(known, varied=(varied,))
+    plans = [Rest(5.0).plan(IMPACT)]
+    [tight] = predict(plans, [known, other], 5.0, ignore_progress)
+    [free] = predict(plans, [loose, other], 5.0, ignore_progress)
+    assert free.farthest <= 1.0 + 1e-6 or free.farthest < 0.2 * tight.farthest
+
+
+def test_an_experiment_that_one_rival_makes_dangerous_is_not_performed() -> None:
+    turned = GroovePose(rz=-0.06)  # the groove falls: a stroke runs into the lips
+    rivals = [rival("nothing"), rival("turned", turned)]
+    plans = [
+        Reversals(way=0.8, times=1, speed=1.0).plan(IMPACT),
+        Rest(1.0).plan(IMPACT),
+    ]
+    found = {p.plan.text: p for p in predict(plans, rivals, 5.0, ignore_progress)}
+    stroke = found[plans[0].text]
+    assert "under turned" in stroke.hazard and stroke.value == 0.0
+    assert found[plans[1].text].hazard == ""

@@ -1,0 +1,86 @@
+"""A station finds out what its model lacks: simulated, few effects, IMPACT contact."""
+
+import dataclasses
+import html
+from pathlib import Path
+
+import pytest
+
+from drake_disasm.effects import SensorWarmUp
+from drake_disasm.experiments import Presses, Rest, Reversals
+from drake_disasm.logs import read_log
+from drake_disasm.scenario import Scenario, load_scenario
+from sysid.diagnosis import NOTHING, Budget, diagnose
+from sysid.report import diagnosis_page
+from tests.refusals import refused
+
+LIBRARY = ("SensorDrift", "SensorWarmUp", "SensorGain")
+EXPERIMENTS = (Presses, Reversals, Rest)
+IMPACT = load_scenario("removal", ["contact.model=impact"])
+
+
+def _real(*effects: object) -> Scenario:
+    return dataclasses.replace(IMPACT, effects=list(effects))
+
+
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory: pytest.TempPathFactory):
+    folder = tmp_path_factory.mktemp("warm")
+    real = _real(SensorWarmUp(fz=2.0, time_constant=15.0))
+    found = diagnose(IMPACT, folder, station="twin", real=real, library=EXPERIMENTS)
+    return folder, real, found
+
+
+def test_it_ends_with_what_is_hidden(warm) -> None:
+    folder, _, found = warm
+    assert found.is_settled and found.names == ("SensorWarmUp",)
+    assert found.reason == "settled: the model lacks SensorWarmUp"
+    assert found.robot_time < 300.0
+    episodes = read_log(folder / "log").episodes
+    performed = [each for each in found.rounds if each.experiment]
+    assert len(episodes) == 3 + len(performed)
+    for each in performed:
+        assert each.force < 14.0 and each.distance >= 5.0 and len(each.rivals) > 1
+        assert set(each.predicted) == set(each.rivals)
+
+
+def test_the_report_tells_the_story(warm) -> None:
+    page = html.unescape(diagnosis_page(warm[2], {"program": "test"}))
+    assert "settled: the model lacks SensorWarmUp" in page
+    assert all(each.experiment in page for each in warm[2].rounds)
+
+
+def test_a_second_call_performs_nothing_more(warm) -> None:
+    folder, real, first = warm
+    again = diagnose(IMPACT, folder, station="twin", real=real, library=EXPERIMENTS)
+    assert again.robot_time == first.robot_time and again.reason == first.reason
+    with refused("another scenario"):
+        diagnose(load_scenario("iiwa_peg"), folder, station="twin")
+
+
+def test_nothing_is_found_where_nothing_is_hidden(tmp_path: Path) -> None:
+    found = diagnose(
+        IMPACT,
+        tmp_path,
+        station="twin",
+        budget=Budget(60.0),
+        library=EXPERIMENTS,
+    )
+    assert found.names == () and not found.closed.verdict.ambiguous
+    assert {name.partition(" and ")[0] for r in found.rounds for name in r.rivals} >= {
+        NOTHING
+    }
+
+
+def test_a_person_may_say_no_and_a_budget_may_be_too_small(tmp_path: Path) -> None:
+    asked: list[str] = []
+
+    def no(question: str) -> bool:
+        asked.append(question)
+        return False
+
+    with refused("stopped by hand"):
+        diagnose(IMPACT, tmp_path / "no", station="twin", confirm=no)
+    assert "Removal" in asked[0]
+    with refused("budget", "before the first verdict"):
+        diagnose(IMPACT, tmp_path / "few", station="twin", budget=Budget(1.0))

@@ -1,0 +1,154 @@
+"""Finds what a model lacks by the station's own experiments, and says when it knows.
+
+Records three removals and asks for the verdict, as close-loop does. Of the effects that
+the verdict can't tell apart, or that its log could not have shown, the twin predicts
+what each would do in every experiment of the library; the experiment that separates
+them best per second of robot time is performed and added to the log, and the verdict is
+asked for again. It ends when one hypothesis is left, when no experiment would help, or
+when the robot time is spent.
+
+An experiment is performed only if the twin keeps within 70 % of the task's force and
+torque, the workspace and the arm's joint limits under every hypothesis. Before each one
+a person is asked, unless --yes. The log, the fits and the story of the rounds
+(`report.html`, `diagnosis.json`) are in --out; after Ctrl-C the same command goes on.
+
+Exit status: 0 if one hypothesis is left, 3 if not, 2 for input that can't be used.
+"""
+
+import argparse
+import contextlib
+import math
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from drake_disasm.common import options, program
+from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.files import write_text
+from drake_disasm.experiments import find_experiment, registered_experiments
+from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.task.simulation import StationFactory
+from drake_disasm_cli import common, hardware
+from sysid.diagnosis import Budget, Diagnosis, diagnose
+from sysid.report import diagnosis_page
+from sysid.workers import Workers
+
+EXIT_OPEN = 3
+
+_MINUTE = 60.0  # s
+_EXAMPLES = """examples:
+  drake-disasm diagnose --scenario removal --hidden removal_turned --yes \\
+      --out out/diagnosis
+  drake-disasm diagnose --station twin --scenario iiwa_peg --yes --robot-time 120 \\
+      --verdict-time 5 --out out/peg
+  drake-disasm diagnose --station hardware --hardware-config cell.yaml \\
+      --scenario removal --experiments Presses Reversals Rest --out out/cell
+"""
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Returns the parsed command line."""
+    parser = program.argument_parser("drake-disasm diagnose", __doc__, _EXAMPLES)
+    add = parser.add_argument
+    common.add_scenario_arguments(parser)
+    common.add_station_argument(
+        add, "cell", "on which experiments are performed", hardware=True
+    )
+    hardware.add_config_argument(add)
+    common.add_hidden_argument(add)
+    _add_budget_arguments(add)
+    add("--yes", action="store_true", help="perform each experiment without asking")
+    common.add_workers_argument(parser)
+    add("--out", required=True, type=Path, metavar="DIR", help="of log and report")
+    return parser.parse_args(arguments)
+
+
+def _add_budget_arguments(add: Callable[..., object]) -> None:
+    add(
+        "--robot-time",
+        type=options.above_zero,
+        default=Budget().robot,
+        metavar="S",
+        help=f"after which no experiment begins (default: {Budget().robot:g})",
+    )
+    add(
+        "--verdict-time",
+        type=options.above_zero_or_inf,
+        default=math.inf,
+        metavar="MIN",
+        help="of the computer for each verdict (default: as long as it takes)",
+    )
+    names = ", ".join(kind.__name__ for kind in registered_experiments())
+    add(
+        "--experiments",
+        nargs="+",
+        metavar="NAME",
+        help=f"to choose from: {names} (default: all of them)",
+    )
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the program; returns its exit status."""
+    args = parse(arguments)
+    hardware.refuse_contradictions(args, ["hardware_config"], {"hidden": None})
+    scenario = load_scenario(args.scenario, args.overrides)
+    kinds = args.experiments and [find_experiment(n) for n in args.experiments]
+    budget = Budget(args.robot_time, _MINUTE * args.verdict_time)
+    with (
+        program.ProgressBar(unit="simulation") as progress,
+        Workers(args.workers, progress=progress) as workers,
+        _station(args, scenario) as station,
+    ):
+        found = diagnose(
+            scenario,
+            args.out,
+            station=station,
+            real=common.real_scenario(args, scenario),
+            budget=budget,
+            library=kinds,
+            confirm=(lambda _: True) if args.yes else _asked,
+            workers=workers,
+            progress=progress,
+        )
+    origin = program.provenance("drake-disasm diagnose", arguments, 0)
+    write_text(args.out / "report.html", diagnosis_page(found, origin))
+    print(_text(found))
+    print(f"report: {args.out / 'report.html'}")
+    return 0 if found.is_settled else EXIT_OPEN
+
+
+@contextlib.contextmanager
+def _station(
+    args: argparse.Namespace, scenario: Scenario
+) -> Iterator[str | StationFactory]:
+    """Yields the station's name, or what gives the hardware's."""
+    if args.station != "hardware":
+        yield args.station
+        return
+    with hardware.open_station(scenario, args.hardware_config, False) as station:
+        yield lambda _: station
+
+
+def _asked(question: str) -> bool:
+    """Returns whether a person wants an experiment.
+
+    Raises:
+        DisasmError: nobody is there.
+    """
+    try:
+        return input(f"{question}; perform it? [y/N] ").strip().lower() in ("y", "yes")
+    except EOFError:
+        raise DisasmError("nobody answers; give --yes") from None
+
+
+def _text(found: Diagnosis) -> str:
+    """Returns the story of a diagnosis in lines."""
+    lines = [f"three removals: {found.first_time:.0f} s of robot time"]
+    for each in found.rounds:
+        left = ", ".join(f"{name} {w:.2f}" for name, w in each.rivals.items())
+        lines.append(f"left: {left}")
+        if each.experiment:
+            ended = f", {each.ended}" if each.ended else ""
+            force = f"at most {each.force:.1f} N{ended}"
+            lines.append(f"{each.experiment}: {each.robot_time:.0f} s, {force}")
+    lines.append(f"{found.reason} ({found.robot_time:.0f} s of robot time)")
+    return "\n".join([*lines, found.closed.text])
