@@ -8,14 +8,17 @@ import numpy as np
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.experiments.base import Plan
 from drake_disasm.experiments.performer import Performer
-from drake_disasm.mdp import BoltState, Outcome
+from drake_disasm.mdp import BoltState, Outcome, TaskGeometry
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations import Station
 from drake_disasm.task.episode import Recorder
 from drake_disasm.task.simulation import StationFactory, StepResult, TaskSimulation
 from drake_disasm.twin.batch import BatchedTwin
 
-_FAILURES = (Outcome.FORCE_LIMIT, Outcome.TORQUE_LIMIT, Outcome.WORKSPACE)
+#: A state (12,), or several.
+Array = np.ndarray
+
+_LOADS = (Outcome.FORCE_LIMIT, Outcome.TORQUE_LIMIT)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,7 +90,7 @@ class Laboratory:
             result = simulation.step()
             found.append(result.observation)
             actions.append(simulation.action())
-            ended = _ended(result)
+            ended = _ended(result, simulation.systems.monitor.geometry)
             is_over = bool(ended) or performer.is_done
             if recorder:
                 recorder.acted(_in_a_log(result, is_over))
@@ -99,13 +102,16 @@ class Laboratory:
 
 
 def perform_side_by_side(
-    scenarios: Sequence[Scenario], plans: Sequence[Plan]
+    scenarios: Sequence[Scenario],
+    plans: Sequence[Plan],
+    progress: Progress = ignore_progress,
 ) -> list[list[Performance]]:
     """Returns experiments on some twins, each in an environment of one batch.
 
     Args:
         scenarios: of the twins, with IMPACT contact, without noise.
         plans: of experiments.
+        progress: gets each step.
 
     Returns:
         For each twin all experiments.
@@ -113,14 +119,31 @@ def perform_side_by_side(
     Raises:
         DisasmError: the batch does not have a scenario's effects or contact.
     """
+    usual = 2.0 * float(np.median([plan.most_steps for plan in plans]))
+    short = [n for n, plan in enumerate(plans) if plan.most_steps <= usual]
+    long = [n for n in range(len(plans)) if n not in short]  # nothing waits for these
+    found: dict[int, Sequence[Performance]] = {}
+    for numbers in (short, long):
+        if numbers:
+            done = _batch(scenarios, [plans[n] for n in numbers], progress)
+            found.update(zip(numbers, zip(*done, strict=True), strict=True))
+    return [[found[n][row] for n in range(len(plans))] for row in range(len(scenarios))]
+
+
+def _batch(
+    scenarios: Sequence[Scenario], plans: Sequence[Plan], progress: Progress
+) -> list[list[Performance]]:
     rows = [scenario for scenario in scenarios for _ in plans]
     twin = BatchedTwin(rows, device="numpy")
+    geometry = TaskGeometry.of(scenarios[0], np.zeros((6, 6)))
     performers = [Performer(plan) for _ in scenarios for plan in plans]
     states = [twin.reset([0] * len(rows)).copy()]
     actions: list[np.ndarray] = []
     ended, steps = [""] * len(rows), np.zeros(len(rows), int)
     running = np.ones(len(rows), bool)
+    most = max(plan.most_steps for plan in plans)
     while running.any():
+        progress(ProgressUpdate("predicting", len(actions), most))
         pairs = zip(performers, states[-1], strict=True)
         result = twin.step(np.array([act(state) for act, state in pairs]))
         actions.append(twin.action.copy())
@@ -128,7 +151,7 @@ def perform_side_by_side(
         steps += running
         for i in np.flatnonzero(running).tolist():
             outcome = Outcome(int(result.outcome[i]))
-            failure = outcome.label if outcome in _FAILURES else ""
+            failure = _failure(outcome, result.observation[i], geometry)
             ended[i] = result.failure[i] or failure
             running[i] = not (ended[i] or performers[i].is_done)
     table, asked = np.array(states), np.array(actions)
@@ -139,16 +162,28 @@ def perform_side_by_side(
     return [[next(found) for _ in plans] for _ in scenarios]
 
 
-def _ended(result: StepResult) -> str:
+def _ended(result: StepResult, geometry: TaskGeometry) -> str:
     """Returns why an experiment can't go on; that the bolt is out ends none."""
     if not result.is_whole:
         return "the station did not come to the step's end"
-    return result.outcome.label if result.outcome in _FAILURES else ""
+    return _failure(result.outcome, result.observation, geometry)
+
+
+def _failure(outcome: Outcome, observation: Array, geometry: TaskGeometry) -> str:
+    """Returns in what an experiment has failed; empty if it goes on.
+
+    A bolt leaves the workspace where the measured pose says so, too: the task adds what
+    the grip yields to the reading, and to one that drifts it yields nothing.
+    """
+    p = observation[:3]
+    is_inside = np.all((geometry.low <= p) & (p <= geometry.high))
+    is_failure = outcome in _LOADS or (outcome is Outcome.WORKSPACE and not is_inside)
+    return outcome.label if is_failure else ""
 
 
 def _in_a_log(result: StepResult, is_over: bool) -> StepResult:
     """Returns a step as the log has it: an episode ends with the experiment."""
     outcome = Outcome.STEP_LIMIT if is_over else Outcome.RUNNING
-    if result.outcome in _FAILURES:
+    if result.outcome in _LOADS:
         outcome = result.outcome
     return dataclasses.replace(result, outcome=outcome)

@@ -33,7 +33,7 @@ from drake_disasm.experiments.performing import (
 )
 from drake_disasm.scenario import Scenario
 from drake_disasm.twin.steps import noise_free
-from sysid.diagnosis.rivals import Rival
+from sysid.diagnosis.rivals import BY_CHANCE, Rival
 from sysid.models.base import Array
 from sysid.models.transitions import FORCE_ERROR, POSE_NOISE
 from sysid.models.twin import with_impact_as_stiff
@@ -53,7 +53,6 @@ class Prediction:
         distances: (k, k) between rivals, in standard deviations.
         sigma: (12,) by which a measured state may differ anyway.
         hazard: why it is not performed, in words; empty if it may be.
-        needed: distance at which a verdict tells two rivals apart.
         value: error probability that it takes away, per second.
     """
 
@@ -63,7 +62,6 @@ class Prediction:
     distances: Array
     sigma: Array
     hazard: str
-    needed: float
     value: float
 
     @property
@@ -79,9 +77,9 @@ class Prediction:
         return int(np.argmax(np.sum(np.ptp(states / self.sigma, axis=0) ** 2, axis=0)))
 
     @property
-    def is_enough(self) -> bool:
-        """Whether a verdict would then tell two rivals apart, one way or another."""
-        return not self.hazard and self.farthest >= self.needed
+    def is_helpful(self) -> bool:
+        """Whether it is safe, and would show two rivals to differ."""
+        return not self.hazard and self.farthest >= BY_CHANCE
 
     @property
     def farthest(self) -> float:
@@ -103,22 +101,21 @@ def predict(
         needed: distance at which a verdict tells two rivals apart, d0.
         progress: gets each simulation.
     """
-    led = [
-        _performed(plans, [rival.scenario], rival.name, progress) for rival in rivals
-    ]
+    led = _performed(plans, [rival.scenario for rival in rivals], progress)
     replays = [
         Plan(plan.experiment, (Replay(one.actions),), plan.period)
-        for plan, one in zip(plans, led[0][0], strict=True)
+        for plan, one in zip(plans, led[0], strict=True)
     ]
+    twins = [each for rival in rivals for each in (rival.scenario, *rival.varied)]
+    repeated = iter(_performed(replays, twins, progress))
     replayed = [
-        _performed(replays, (rival.scenario, *rival.varied), rival.name, progress)
-        for rival in rivals
+        [next(repeated) for _ in (rival.scenario, *rival.varied)] for rival in rivals
     ]
     weights = np.array([rival.weight for rival in rivals])
     sigma, reach = _sigma(rivals[0].scenario), _Reach(rivals[0].scenario)
     found = []
     for number, plan in enumerate(plans):
-        done = tuple(own[0][number] for own in led)
+        done = tuple(own[number] for own in led)
         same = [[twin[number] for twin in own] for own in replayed]
         duration = max(each.duration for each in done)
         distances = _distances(same, sigma)
@@ -126,37 +123,49 @@ def predict(
         gain = 0.0 if hazard else _gain(distances / needed, weights)
         value = gain / max(duration, plan.period)
         shown = tuple(own[0] for own in same)
-        found.append(
-            Prediction(plan, done, shown, distances, sigma, hazard, needed, value)
-        )
+        found.append(Prediction(plan, done, shown, distances, sigma, hazard, value))
     return sorted(found, key=lambda each: -each.value)
 
 
-def _performed(
-    plans: Sequence[Plan],
-    scenarios: Sequence[Scenario],
-    name: str,
-    progress: Progress,
-) -> list[list[Performance]]:
-    """Returns experiments on each of a rival's twins.
+def together(predictions: Sequence[Prediction], left: float) -> float:
+    """Returns how far experiments one after the other separate two rivals.
 
-    All at once with IMPACT contact, as stiff as the rival's, if it has such a form.
+    Args:
+        predictions: of experiments, the best first.
+        left: robot time [s]; those are left out that it is too short for.
     """
-    progress(ProgressUpdate(f"predicting: {name}", 0, len(plans)))
+    squares: float | Array = 0.0
+    for each in predictions:
+        if each.duration <= left:
+            left -= each.duration
+            squares = squares + each.distances**2
+    return float(np.sqrt(np.max(squares)))
+
+
+def _performed(
+    plans: Sequence[Plan], scenarios: Sequence[Scenario], progress: Progress
+) -> list[list[Performance]]:
+    """Returns experiments on each of some twins.
+
+    All at once with IMPACT contact, as stiff as their own, where they have such a form.
+    """
     twins = [noise_free(each) for each in scenarios]
     try:
-        return perform_side_by_side([as_batch(each) for each in twins], plans)
+        batch = [as_batch(each) for each in twins]
+        return perform_side_by_side(batch, plans, progress)
     except DisasmError:  # an effect or a part that the batch does not have
-        return [_one_by_one(plans, each, name, progress) for each in twins]
+        if len(twins) == 1:
+            return [_one_by_one(plans, twins[0], progress)]
+    return [own for each in twins for own in _performed(plans, [each], progress)]
 
 
 def _one_by_one(
-    plans: Sequence[Plan], scenario: Scenario, name: str, progress: Progress
+    plans: Sequence[Plan], scenario: Scenario, progress: Progress
 ) -> list[Performance]:
     """Returns each experiment on the diagram's twin."""
     laboratory, found = Laboratory(scenario, "twin"), []
     for number, plan in enumerate(plans):
-        progress(ProgressUpdate(f"predicting: {name}", number, len(plans), plan.text))
+        progress(ProgressUpdate("predicting", number, len(plans), plan.text))
         try:
             found.append(laboratory.perform(plan))
         except (DivergedError, UnreachableError) as error:

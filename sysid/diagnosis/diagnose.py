@@ -9,6 +9,7 @@ from typing import Any
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, read_json, write_json
 from drake_disasm.common.progress import Progress, ignore_progress
+from drake_disasm.effects import Effect
 from drake_disasm.experiments import Experiment, Plan, Removal, registered_experiments
 from drake_disasm.experiments.performing import Laboratory, Performance
 from drake_disasm.logs import LogWriter, read_log
@@ -17,7 +18,7 @@ from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.scenario import Scenario, scenario_to_mapping
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 from drake_disasm.task.simulation import StationFactory
-from sysid.diagnosis.design import Prediction, predict
+from sysid.diagnosis.design import Prediction, predict, together
 from sysid.diagnosis.rivals import NOTHING, Rival, needed_distance, rivals_of
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.models.base import LogModel
@@ -119,7 +120,8 @@ def diagnose(
     station: str | StationFactory = "cell",
     real: Scenario | None = None,
     budget: Budget = Budget(),
-    library: Sequence[type[Experiment]] | None = None,
+    experiments: Sequence[type[Experiment]] | None = None,
+    effects: Sequence[type[Effect]] | None = None,
     confirm: Confirm = lambda _: True,
     workers: Workers | None = None,
     progress: Progress = ignore_progress,
@@ -137,7 +139,8 @@ def diagnose(
         station: "cell", "twin", or what makes the hardware's.
         real: scenario of a simulated station; the model's if left out.
         budget: after which no experiment begins.
-        library: experiments; all registered ones if left out.
+        experiments: to choose from; all registered ones if left out.
+        effects: that may be named; all registered ones if left out.
         confirm: is asked before each experiment.
         workers: fit.
         progress: gets each step.
@@ -149,13 +152,14 @@ def diagnose(
     workers = workers or Workers()
     session = _Session(scenario, folder, station, real or scenario, progress)
     session.record_first(budget, confirm)
-    plans = _plans(scenario, library)
+    plans = _plans(scenario, experiments)
     while True:
-        closed, model = session.verdict(workers, budget.verdict)
+        closed, model = session.verdict(effects, workers, budget.verdict)
         rivals = rivals_of(closed, model, workers, folder / "fits")
-        predictions = session.predict(plans, rivals, needed_distance(closed))
+        needed = needed_distance(closed)
+        predictions = session.predict(plans, rivals, needed)
         left = budget.robot - session.robot_time
-        best, reason = _choice(closed, rivals, predictions, left)
+        best, reason = _choice(closed, rivals, predictions, needed, left)
         if best is not None and not confirm(_question(best)):
             best, reason = None, "stopped by hand; the same command goes on from here"
         if best is None:
@@ -171,11 +175,9 @@ def diagnose(
         session.experiment(closed, rivals, best)
 
 
-def _plans(
-    scenario: Scenario, library: Sequence[type[Experiment]] | None
-) -> list[Plan]:
-    """Returns all experiments of a library that a scenario has anything to do with."""
-    kinds = registered_experiments() if library is None else library
+def _plans(scenario: Scenario, kinds: Sequence[type[Experiment]] | None) -> list[Plan]:
+    """Returns all experiments that a scenario has anything to do with."""
+    kinds = registered_experiments() if kinds is None else kinds
     kinds = [kind for kind in kinds if kind is not Removal]
     plans = [e.plan(scenario) for kind in kinds for e in kind.variants()]
     return [plan for plan in plans if plan.phases]
@@ -185,6 +187,7 @@ def _choice(
     closed: ClosedLoop,
     rivals: Sequence[Rival],
     predictions: Sequence[Prediction],
+    needed: float,
     left: float,
 ) -> tuple[Prediction | None, str]:
     """Returns the experiment to perform, or why there is none.
@@ -193,18 +196,19 @@ def _choice(
         closed: the verdict.
         rivals: that it leaves.
         predictions: of experiments that were not performed yet, the best first.
+        needed: distance at which a verdict tells two rivals apart.
         left: robot time [s].
     """
     if len(rivals) < 2:
         return None, _settled(closed)
-    safe = [p for p in predictions if p.is_enough]
-    if not safe:
-        return None, _inseparable(rivals, predictions)
-    affordable = [p for p in safe if p.duration <= left]
-    if not affordable:
+    helpful = [p for p in predictions if p.is_helpful]
+    if together(helpful, math.inf) < needed:
+        return None, _inseparable(rivals, predictions, needed)
+    affordable = [p for p in helpful if p.duration <= left]
+    if not affordable or together(affordable, left) < needed:
         return None, (
-            f"the budget is spent: {left:.0f} s are left, and the shortest experiment "
-            f"that helps takes {min(p.duration for p in safe):.0f} s"
+            f"the budget is spent: with the {left:.0f} s that are left no experiments "
+            f"separate {_first_two(rivals)}"
         )
     return affordable[0], ""
 
@@ -217,9 +221,15 @@ def _settled(closed: ClosedLoop) -> str:
     return f"settled: the model lacks {names}"
 
 
-def _inseparable(rivals: Sequence[Rival], predictions: Sequence[Prediction]) -> str:
+def _first_two(rivals: Sequence[Rival]) -> str:
+    return " and ".join(rival.name for rival in rivals[:2])
+
+
+def _inseparable(
+    rivals: Sequence[Rival], predictions: Sequence[Prediction], needed: float
+) -> str:
     """Returns why no experiment is performed, with the proof."""
-    names = " and ".join(rival.name for rival in rivals[:2])
+    names = _first_two(rivals)
     safe = [p for p in predictions if not p.hazard]
     if not safe:
         first = next((p.hazard for p in predictions), "there is no experiment")
@@ -228,7 +238,7 @@ def _inseparable(rivals: Sequence[Rival], predictions: Sequence[Prediction]) -> 
     return (
         f"no experiment separates {names}: the largest difference that any predicts is "
         f"{most.farthest:.1f} standard deviations, of {most.plan.text}, and the "
-        f"verdict needs {most.needed:.1f}"
+        f"verdict needs {needed:.1f}"
     )
 
 
@@ -291,7 +301,10 @@ class _Session:
             self._write("")
 
     def verdict(
-        self, workers: Workers, time_budget: float
+        self,
+        library: Sequence[type[Effect]] | None,
+        workers: Workers,
+        time_budget: float,
     ) -> tuple[ClosedLoop, LogModel]:
         """Returns the verdict on the log so far, and the model of it.
 
@@ -305,6 +318,7 @@ class _Session:
             model,
             train=range(len(log.episodes)),
             test=(),
+            library=library,
             workers=workers,
             progress=self._progress,
             folder=self._folder / "fits",

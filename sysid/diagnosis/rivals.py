@@ -22,7 +22,9 @@ from sysid.workers import Workers
 #: What the hypothesis is called that the model lacks nothing (more).
 NOTHING = "nothing"
 
-_BY_CHANCE = 5.0  # standard deviations
+#: How far apart two rivals are that differ by more than chance, in standard deviations.
+BY_CHANCE = 5.0
+
 _LEAST = 1e-4  # weight of a hypothesis that the log speaks against
 _DRAWS = 2000  # of folds: a weight of a half is then known to a hundredth
 _OF_BOUND = 0.5  # of an amplitude that no size within its bounds would have shown
@@ -92,7 +94,7 @@ def needed_distance(closed: ClosedLoop) -> float:
     left = closed.last.loss
     taken = max(closed.first.loss - left, 0.0)
     margin = closed.last.settings.ambiguity_margin * min(taken, left)
-    return max(_BY_CHANCE, float(np.sqrt(margin)))
+    return max(BY_CHANCE, float(np.sqrt(margin)))
 
 
 def _varied(fit: Fit) -> Iterator[Scenario]:

@@ -104,7 +104,7 @@ def main(arguments: Sequence[str]) -> int:
             station=station,
             real=common.real_scenario(args, scenario),
             budget=budget,
-            library=kinds,
+            experiments=kinds,
             confirm=(lambda _: True) if args.yes else _asked,
             workers=workers,
             progress=progress,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from drake_disasm.effects import SensorWarmUp
+from drake_disasm.effects import SensorDrift, SensorGain, SensorWarmUp
 from drake_disasm.experiments import Presses, Rest, Reversals
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
@@ -14,8 +14,10 @@ from sysid.diagnosis import NOTHING, Budget, diagnose
 from sysid.report import diagnosis_page
 from tests.refusals import refused
 
-LIBRARY = ("SensorDrift", "SensorWarmUp", "SensorGain")
-EXPERIMENTS = (Presses, Reversals, Rest)
+FEW = {
+    "effects": (SensorDrift, SensorWarmUp, SensorGain),
+    "experiments": (Presses, Reversals, Rest),
+}
 IMPACT = load_scenario("removal", ["contact.model=impact"])
 
 
@@ -27,7 +29,7 @@ def _real(*effects: object) -> Scenario:
 def warm(tmp_path_factory: pytest.TempPathFactory):
     folder = tmp_path_factory.mktemp("warm")
     real = _real(SensorWarmUp(fz=2.0, time_constant=15.0))
-    found = diagnose(IMPACT, folder, station="twin", real=real, library=EXPERIMENTS)
+    found = diagnose(IMPACT, folder, station="twin", real=real, **FEW)
     return folder, real, found
 
 
@@ -52,7 +54,7 @@ def test_the_report_tells_the_story(warm) -> None:
 
 def test_a_second_call_performs_nothing_more(warm) -> None:
     folder, real, first = warm
-    again = diagnose(IMPACT, folder, station="twin", real=real, library=EXPERIMENTS)
+    again = diagnose(IMPACT, folder, station="twin", real=real, **FEW)
     assert again.robot_time == first.robot_time and again.reason == first.reason
     with refused("another scenario"):
         diagnose(load_scenario("iiwa_peg"), folder, station="twin")
@@ -64,7 +66,7 @@ def test_nothing_is_found_where_nothing_is_hidden(tmp_path: Path) -> None:
         tmp_path,
         station="twin",
         budget=Budget(60.0),
-        library=EXPERIMENTS,
+        **FEW,
     )
     assert found.names == () and not found.closed.verdict.ambiguous
     assert {name.partition(" and ")[0] for r in found.rounds for name in r.rivals} >= {
@@ -80,7 +82,7 @@ def test_a_person_may_say_no_and_a_budget_may_be_too_small(tmp_path: Path) -> No
         return False
 
     with refused("stopped by hand"):
-        diagnose(IMPACT, tmp_path / "no", station="twin", confirm=no)
+        diagnose(IMPACT, tmp_path / "no", station="twin", confirm=no, **FEW)
     assert "Removal" in asked[0]
     with refused("budget", "before the first verdict"):
         diagnose(IMPACT, tmp_path / "few", station="twin", budget=Budget(1.0))
