@@ -30,7 +30,7 @@ FLOORS = {
         {"twin"},
         {"stations", "policies"},
         {"task", "free_motion"},
-        {"visualization", "learning"},
+        {"visualization", "learning", "experiments"},
     ),
     "sysid": (
         {"parameters", "confidence", "deadline", "optimise", "thresholds"},
@@ -42,7 +42,7 @@ FLOORS = {
         {"fitting"},
         {"residuals"},
         {"effect_selection"},
-        {"export", "acceptance"},
+        {"export", "acceptance", "diagnosis"},
         {"validation", "report", "experiment_design", "studies", "monitoring"},
     ),
 }

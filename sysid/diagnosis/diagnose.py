@@ -11,18 +11,13 @@ from drake_disasm.common.files import make_folder, read_json, write_json
 from drake_disasm.common.progress import Progress, ignore_progress
 from drake_disasm.effects import Effect
 from drake_disasm.experiments import Experiment, Plan, Removal, registered_experiments
-from drake_disasm.experiments.performing import Laboratory, Performance
-from drake_disasm.logs import LogWriter, read_log
-from drake_disasm.logs.columns import flat_columns
 from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.scenario import Scenario, scenario_to_mapping
-from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 from drake_disasm.task.simulation import StationFactory
 from sysid.diagnosis.design import Prediction, predict, together
+from sysid.diagnosis.growing_log import GrowingLog
 from sysid.diagnosis.rivals import NOTHING, Rival, needed_distance, rivals_of
-from sysid.effect_selection.close_loop import ClosedLoop, close_loop
-from sysid.models.base import LogModel
-from sysid.models.from_logs import ModelChoice, model_of
+from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.workers import Workers
 
 _FIRST = 3  # removals before the first verdict
@@ -149,13 +144,13 @@ def diagnose(
         DisasmError: the budget is too small for a first recording, the folder holds
             another scenario's, or what close_loop and the station raise.
     """
-    workers = workers or Workers()
+    workers, fits = workers or Workers(), folder / "fits"
     session = _Session(scenario, folder, station, real or scenario, progress)
     session.record_first(budget, confirm)
     plans = _plans(scenario, experiments)
     while True:
-        closed, model = session.verdict(effects, workers, budget.verdict)
-        rivals = rivals_of(closed, model, workers, folder / "fits")
+        closed, model = session.log.verdict(effects, workers, budget.verdict, fits)
+        rivals = rivals_of(closed, model, workers, fits)
         needed = needed_distance(closed)
         predictions = session.predict(plans, rivals, needed)
         left = budget.robot - session.robot_time
@@ -255,6 +250,7 @@ class _Session:
     """A folder with a log that grows, and what is known of it.
 
     Attributes:
+        log: of all experiments.
         rounds: so far.
         first_time: robot time before the first verdict [s].
     """
@@ -269,16 +265,12 @@ class _Session:
     ) -> None:
         self._scenario, self._folder = scenario, folder
         self._progress = progress
-        self._laboratory = Laboratory(real, station)
         make_folder(folder)
         self._file = folder / "diagnosis.json"
         self.rounds: list[Round] = []
         self.first_time = 0.0
         self._read()
-        header = transitions_header(
-            scenario, self._laboratory.station.kind, {"program": "diagnose"}
-        )
-        self._writer = LogWriter(folder / "log", header, resume=True)
+        self.log = GrowingLog(scenario, folder / "log", station, real, progress)
 
     @property
     def robot_time(self) -> float:
@@ -287,7 +279,7 @@ class _Session:
 
     def record_first(self, budget: Budget, confirm: Confirm) -> None:
         """Records removals, if the log has none."""
-        for number in range(self._writer.next_number, _FIRST):
+        for number in range(self.log.episodes, _FIRST):
             plan = Removal(seed=number).plan(self._scenario)
             if self.first_time > budget.robot:
                 raise DisasmError(
@@ -297,34 +289,8 @@ class _Session:
             most = plan.most_steps * plan.period
             if not confirm(f"{plan.text}: at most {most:.0f} s"):
                 raise DisasmError("stopped by hand before the first verdict")
-            self.first_time += self._perform(plan).duration
+            self.first_time += self.log.perform(plan).duration
             self._write("")
-
-    def verdict(
-        self,
-        library: Sequence[type[Effect]] | None,
-        workers: Workers,
-        time_budget: float,
-    ) -> tuple[ClosedLoop, LogModel]:
-        """Returns the verdict on the log so far, and the model of it.
-
-        Every episode is fitted, contiguous blocks are held out in turn: an experiment
-        is made to be learned from.
-        """
-        log = read_log(self._folder / "log")
-        choice = ModelChoice(scenario=self._scenario, fixed=True)
-        model = model_of([log], choice)
-        closed = close_loop(
-            model,
-            train=range(len(log.episodes)),
-            test=(),
-            library=library,
-            workers=workers,
-            progress=self._progress,
-            folder=self._folder / "fits",
-            time_budget=time_budget,
-        )
-        return closed, model
 
     def predict(
         self, plans: Sequence[Plan], rivals: Sequence[Rival], needed: float
@@ -340,7 +306,7 @@ class _Session:
         self, closed: ClosedLoop, rivals: Sequence[Rival], chosen: Prediction
     ) -> None:
         """Performs an experiment and adds it to the log."""
-        found = self._perform(chosen.plan)
+        found = self.log.perform(chosen.plan)
         (force, torque), i = found.greatest, chosen.channel
         pairs = zip(rivals, chosen.replayed, strict=True)
         self.rounds.append(
@@ -363,18 +329,6 @@ class _Session:
         """Notes the last verdict, which has no experiment, and why it is the last."""
         self.rounds.append(_round(closed, rivals))
         self._write(reason)
-
-    def _perform(self, plan: Plan) -> Performance:
-        """Performs an experiment; what was recorded is kept if the station holds."""
-        number, laboratory = self._writer.next_number, self._laboratory
-        if laboratory.station.kind == "hardware":
-            with self._writer.begin_episode() as episode:
-                recorder = EpisodeRecorder(laboratory.simulation, episode)
-                return laboratory.perform(plan, number, recorder, self._progress)
-        recorder = EpisodeRecorder(laboratory.simulation)
-        found = laboratory.perform(plan, number, recorder, self._progress)
-        self._writer.write_episode(flat_columns("transitions", recorder.columns()))
-        return found
 
     def _read(self) -> None:
         """Takes up what an earlier call has done.

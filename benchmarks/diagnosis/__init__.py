@@ -1,0 +1,1 @@
+"""Diagnoses of hidden worlds, judged; see `judge`."""

@@ -1,0 +1,90 @@
+"""Runners that the library brings: passive logs, random experiments, and `diagnose`."""
+
+import itertools
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from diagnosis.answer import Answer
+from diagnosis.worlds import World, library
+from drake_disasm.common.progress import ignore_progress
+from drake_disasm.experiments import Plan, Removal, registered_experiments
+from drake_disasm.experiments.performing import Performance
+from sysid.diagnosis import NOTHING, Budget, GrowingLog, Rival, diagnose, predict
+
+_FIRST = 3  # removals, as `diagnose` begins
+
+
+def ours(world: World, folder: Path, seconds: float) -> Answer:
+    """Chooses the experiments by what is left."""
+    found = diagnose(
+        world.model,
+        folder,
+        real=world.real,
+        budget=Budget(seconds),
+        effects=library(),
+    )
+    performed = [each for each in found.rounds if each.experiment]
+    return Answer.of(
+        found.closed,
+        robot_time=found.robot_time,
+        experiments=tuple(each.experiment for each in performed),
+        force=max((each.force for each in performed), default=0.0),
+        torque=max((each.torque for each in performed), default=0.0),
+        cut_short=tuple(each.ended for each in performed if each.ended),
+    )
+
+
+def passive(world: World, folder: Path, seconds: float) -> Answer:
+    """Records removals alone."""
+
+    plans = (Removal(seed=number).plan(world.model) for number in itertools.count())
+    return _performed(world, folder, seconds, plans)
+
+
+def by_chance(world: World, folder: Path, seconds: float) -> Answer:
+    """Draws experiments that are safe without any effect."""
+    return _performed(world, folder, seconds, _drawn(world))
+
+
+def _drawn(world: World) -> Iterator[Plan]:
+    for number in range(_FIRST):
+        yield Removal(seed=number).plan(world.model)
+    kinds = [kind for kind in registered_experiments() if kind is not Removal]
+    plans = [each.plan(world.model) for kind in kinds for each in kind.variants()]
+    plans = [plan for plan in plans if plan.phases]
+    alone = [Rival(NOTHING, world.model, 1.0)]
+    known = predict(plans, alone, 1.0, ignore_progress)
+    safe = sorted(each.plan.text for each in known if not each.hazard)
+    by_text = {plan.text: plan for plan in plans}
+    random = np.random.default_rng([world.number, len(safe)])
+    while True:
+        yield from (by_text[safe[i]] for i in random.permutation(len(safe)))
+
+
+def _performed(
+    world: World, folder: Path, seconds: float, plans: Iterator[Plan]
+) -> Answer:
+    """Returns what a log of experiments says that go on until the time is over.
+
+    The last one is as long as it is: whoever chooses freely gets a little more.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    log = GrowingLog(world.model, folder / "log", real=world.real)
+    done: list[Performance] = []
+    texts = []
+    while sum(each.duration for each in done) < seconds:
+        plan = next(plans)
+        done.append(log.perform(plan))
+        texts.append(plan.text)
+    closed, _ = log.verdict(library(), fits=folder / "fits")
+    return Answer.of(
+        closed,
+        robot_time=sum(each.duration for each in done),
+        experiments=tuple(texts),
+        force=max(each.greatest[0] for each in done),
+        torque=max(each.greatest[1] for each in done),
+        cut_short=tuple(each.ended for each in done if each.ended),
+    )

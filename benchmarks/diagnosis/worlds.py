@@ -1,0 +1,179 @@
+"""Hidden worlds: a cell that lacks nothing, or one effect that its model does not have.
+
+A world is drawn from its group and its number alone. Sizes are those that a used cell
+may have; what a log of removals would show of them is not looked at.
+"""
+
+import copy
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from diagnosis.unknown_effects import UNKNOWN
+from drake_disasm.effects import Effect, find_effect, registered_effects
+from drake_disasm.scenario import Scenario, load_scenario
+
+#: Effects that logs of removals leave ambiguous.
+PAIRS = (
+    ("SensorDrift", "SensorWarmUp"),
+    ("SensorCrossTalk", "SensorMounting"),
+    ("GroovePose", "GrooveBend"),
+    ("GrooveFriction", "GrooveStribeckFriction"),
+    ("SensorGain", "PayloadError"),
+    ("SensorDelay", "SensorLag"),
+    ("Backlash", "Compliance"),
+)
+_PARTS = ("removal", "iiwa_peg", "iiwa_bayonet")
+#: Of each group: first seed, and how many worlds there are.
+GROUPS: Mapping[str, tuple[int, int]] = {
+    "pairs": (100, 70),
+    "null": (200, 20),
+    "missing": (300, 20),
+    "parts": (400, 60),
+}
+_NULLS, _MISSING = 9, 9  # of the worlds of all parts; the others are of pairs
+
+_Range = tuple[float, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class Sizes:
+    """Of an effect: one of its fields is drawn.
+
+    Attributes:
+        fields: to choose from.
+        of: least and greatest size.
+        is_signed: whether it may be negative.
+        shape: its other fields, all of them.
+    """
+
+    fields: tuple[str, ...]
+    of: _Range
+    is_signed: bool = True
+    shape: Mapping[str, _Range] = dataclasses.field(default_factory=dict)
+
+
+_FORCES = ("fx", "fy", "fz")
+_TALK = ("fx_fy", "fx_fz", "fy_fx", "fy_fz", "fz_fx", "fz_fy")
+_AXES = ("x", "y", "z")
+SIZES: Mapping[str, Sizes] = {
+    "SensorDrift": Sizes(_FORCES, (0.03, 0.1)),
+    "SensorWarmUp": Sizes(_FORCES, (1.0, 3.0), shape={"time_constant": (10.0, 40.0)}),
+    "SensorCrossTalk": Sizes(_TALK, (0.08, 0.25)),
+    "SensorMounting": Sizes(("rx", "ry", "rz"), (0.05, 0.15)),
+    "GroovePose": Sizes(("rx", "ry", "rz"), (0.008, 0.025)),
+    "GrooveBend": Sizes(("ky", "kz"), (0.2, 0.6)),
+    "GrooveFriction": Sizes(("coefficient",), (0.15, 0.4), False),
+    "GrooveStribeckFriction": Sizes(
+        ("coefficient",), (0.15, 0.4), False, {"velocity": (0.005, 0.015)}
+    ),
+    "SensorGain": Sizes(_FORCES, (0.1, 0.3)),
+    "PayloadError": Sizes(("mass",), (0.2, 0.6)),
+    "SensorDelay": Sizes(("delay",), (0.06, 0.2), False),
+    "SensorLag": Sizes(("share",), (0.9, 1.0), False, {"time_constant": (0.1, 0.4)}),
+    "Backlash": Sizes(_AXES, (2e-4, 8e-4), False),
+    "Compliance": Sizes(_AXES, (1e-5, 3.5e-5), False),
+    "SensorBeat": Sizes(("a",), (1.0, 3.0), shape={"frequency": (0.1, 0.4)}),
+    "SensorCurvature": Sizes(("c",), (0.015, 0.04)),
+    "WavyPull": Sizes(("a",), (1.0, 3.0), shape={"length": (0.01, 0.02)}),
+    "Flutter": Sizes(("a",), (1.0, 3.0), shape={"frequency": (0.1, 0.4)}),
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class World:
+    """A cell, and what is hidden in it.
+
+    Attributes:
+        group, number: of which it is drawn.
+        model: what is known of it, with the quick contact model.
+        effects: that are hidden.
+        pair: to which they belong; empty for none.
+    """
+
+    group: str
+    number: int
+    model: Scenario
+    effects: tuple[Effect, ...]
+    pair: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Of its folder."""
+        return f"{self.group}_{self.number}"
+
+    @property
+    def hidden(self) -> tuple[str, ...]:
+        """Names that a verdict is to have: none of an effect that is in no library."""
+        names = [type(effect).__name__ for effect in self.effects]
+        return tuple(n for n in names if find_effect(n) not in UNKNOWN)
+
+    @property
+    def is_in_library(self) -> bool:
+        """Whether the library has what is hidden."""
+        return len(self.hidden) == len(self.effects)
+
+    @property
+    def real(self) -> Scenario:
+        """The cell as it is: with hydroelastic contact, and what is hidden."""
+        real = copy.deepcopy(self.model)
+        real.contact.model, real.effects = "hydroelastic", list(self.effects)
+        return real
+
+
+def library() -> list[type[Effect]]:
+    """Returns the effects that may be named: all but those that no library has."""
+    return [kind for kind in registered_effects() if kind not in UNKNOWN]
+
+
+def draw(group: str, number: int) -> World:
+    """Returns a world."""
+    seed, _ = GROUPS[group]
+    random = np.random.default_rng([seed, number])
+    if group != "parts":
+        return _drawn(group, number, _PARTS[0], group, number, random)
+    part = _PARTS[number % len(_PARTS)]
+    if number < _NULLS:
+        return _drawn(group, number, part, "null", number, random)
+    if number < _NULLS + _MISSING:
+        return _drawn(group, number, part, "missing", number - _NULLS, random)
+    return _drawn(group, number, part, "pairs", (number - 18) // len(_PARTS), random)
+
+
+def _drawn(
+    group: str,
+    number: int,
+    part: str,
+    kind: str,
+    turn: int,
+    random: np.random.Generator,
+) -> World:
+    model = load_scenario(part)
+    model.contact.model = "impact"
+    if kind == "null":
+        return World(group, number, model, ())
+    if kind == "missing":
+        name = UNKNOWN[turn % len(UNKNOWN)].__name__
+        return World(group, number, model, (_effect(name, random),))
+    pair = PAIRS[turn % len(PAIRS)]
+    return World(group, number, model, (_effect(pair[_coin(random)], random),), pair)
+
+
+def _coin(random: np.random.Generator) -> int:
+    return int(random.integers(2))
+
+
+def _effect(name: str, random: np.random.Generator) -> Effect:
+    sizes = SIZES[name]
+    field = str(random.choice(list(sizes.fields)))
+    sign = -1.0 if sizes.is_signed and _coin(random) else 1.0
+    values: dict[str, Any] = {field: sign * _between(sizes.of, random)}
+    shape = {key: _between(of, random) for key, of in sizes.shape.items()}
+    return find_effect(name)(**values, **shape)
+
+
+def _between(of: Sequence[float], random: np.random.Generator) -> float:
+    """Returns a number between two, even on a logarithmic scale."""
+    return float(f"{np.exp(random.uniform(*np.log(of))):.4g}")

@@ -1,0 +1,94 @@
+"""A log that grows by an episode for each experiment, and the verdict on it so far."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from drake_disasm.common.progress import Progress, ignore_progress
+from drake_disasm.effects import Effect
+from drake_disasm.experiments import Plan
+from drake_disasm.experiments.performing import Laboratory, Performance
+from drake_disasm.logs import LogWriter, read_log
+from drake_disasm.logs.columns import flat_columns
+from drake_disasm.scenario import Scenario
+from drake_disasm.task.recording import EpisodeRecorder, transitions_header
+from drake_disasm.task.simulation import StationFactory
+from sysid.effect_selection.close_loop import ClosedLoop, close_loop
+from sysid.models.base import LogModel
+from sysid.models.from_logs import ModelChoice, model_of
+from sysid.workers import Workers
+
+
+class GrowingLog:
+    """A station, and the log of what was performed on it.
+
+    Args:
+        scenario: that the log states.
+        folder: of the log; episodes that are there already are kept.
+        station: "cell", "twin", or what makes the hardware's.
+        real: scenario of a simulated station; the stated one if left out.
+        progress: gets each step.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        folder: Path,
+        station: str | StationFactory = "cell",
+        real: Scenario | None = None,
+        progress: Progress = ignore_progress,
+    ) -> None:
+        self._scenario, self._folder, self._progress = scenario, folder, progress
+        self._laboratory = Laboratory(real or scenario, station)
+        kind = self._laboratory.station.kind
+        header = transitions_header(scenario, kind, {"program": "diagnose"})
+        self._writer = LogWriter(folder, header, resume=True)
+
+    @property
+    def episodes(self) -> int:
+        """How many there are."""
+        return self._writer.next_number
+
+    def perform(self, plan: Plan) -> Performance:
+        """Performs an experiment; what was recorded is kept if the station holds."""
+        number, laboratory = self.episodes, self._laboratory
+        if laboratory.station.kind == "hardware":
+            with self._writer.begin_episode() as episode:
+                recorder = EpisodeRecorder(laboratory.simulation, episode)
+                return laboratory.perform(plan, number, recorder, self._progress)
+        recorder = EpisodeRecorder(laboratory.simulation)
+        found = laboratory.perform(plan, number, recorder, self._progress)
+        self._writer.write_episode(flat_columns("transitions", recorder.columns()))
+        return found
+
+    def verdict(
+        self,
+        effects: Sequence[type[Effect]] | None = None,
+        workers: Workers | None = None,
+        time_budget: float = math.inf,
+        fits: Path | None = None,
+    ) -> tuple[ClosedLoop, LogModel]:
+        """Returns the verdict on the log so far, and the model of it.
+
+        Every episode is fitted, contiguous blocks are held out in turn: an experiment
+        is made to be learned from.
+
+        Args:
+            effects: that may be named; all registered ones if left out.
+            workers: fit.
+            time_budget: see close_loop [s].
+            fits: folder of a cache of them.
+        """
+        log = read_log(self._folder)
+        model = model_of([log], ModelChoice(scenario=self._scenario, fixed=True))
+        closed = close_loop(
+            model,
+            train=range(len(log.episodes)),
+            test=(),
+            library=effects,
+            workers=workers,
+            progress=self._progress,
+            folder=fits,
+            time_budget=time_budget,
+        )
+        return closed, model
