@@ -12,7 +12,7 @@ from diagnosis.worlds import World, library
 from drake_disasm.common.progress import ignore_progress
 from drake_disasm.experiments import Plan, Removal, registered_experiments
 from drake_disasm.experiments.performing import Performance
-from sysid.diagnosis import NOTHING, Budget, GrowingLog, Rival, diagnose, predict
+from sysid.diagnosis import NOTHING, Budget, GrowingLog, Need, Rival, diagnose, predict
 
 _FIRST = 3  # removals, as `diagnose` begins
 
@@ -56,7 +56,7 @@ def _drawn(world: World) -> Iterator[Plan]:
     plans = [each.plan(world.model) for kind in kinds for each in kind.variants()]
     plans = [plan for plan in plans if plan.phases]
     alone = [Rival(NOTHING, world.model, 1.0)]
-    known = predict(plans, alone, 1.0, ignore_progress)
+    known = predict(plans, alone, Need(0.0), ignore_progress)
     safe = sorted(each.plan.text for each in known if not each.hazard)
     by_text = {plan.text: plan for plan in plans}
     random = np.random.default_rng([world.number, len(safe)])

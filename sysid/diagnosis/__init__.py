@@ -3,13 +3,14 @@
 from sysid.diagnosis.design import Prediction, predict
 from sysid.diagnosis.diagnose import Budget, Diagnosis, Round, diagnose
 from sysid.diagnosis.growing_log import GrowingLog
-from sysid.diagnosis.rivals import NOTHING, Rival
+from sysid.diagnosis.rivals import NOTHING, Need, Rival
 
 __all__ = [
     "NOTHING",
     "Budget",
     "Diagnosis",
     "GrowingLog",
+    "Need",
     "Prediction",
     "Rival",
     "Round",

@@ -6,10 +6,11 @@ once more for each parameter that the log leaves uncertain. Two rivals are as fa
 as what a station would measure differs, d, in standard deviations of the sensor's
 noise, of the model's own error and of what their parameters may still be (Box and Hill,
 "Discrimination among mechanistic models", 1967). A verdict tells them apart once one
-takes away enough more of the loss, d0^2. So whoever chooses between them errs with a
+leaves enough more of the loss, d0^2. So whoever chooses between them errs with a
 probability of at most sqrt(w1 w2) exp(-2 (d / d0)^2), which with d0 = 4 is the bound of
 Kailath ("The divergence and Bhattacharyya distance measures in signal selection",
-1967). The best experiment takes most of that away per second of robot time.
+1967). The best experiment takes most of that away per second of robot time, with
+what lies between two experiments.
 """
 
 import dataclasses
@@ -34,7 +35,7 @@ from drake_disasm.experiments.performing import (
 )
 from drake_disasm.scenario import Scenario
 from drake_disasm.twin.steps import noise_free
-from sysid.diagnosis.rivals import BY_CHANCE, Rival
+from sysid.diagnosis.rivals import BY_CHANCE, Need, Rival
 from sysid.models.base import Array
 from sysid.models.transitions import FORCE_ERROR, POSE_NOISE
 from sysid.models.twin import with_impact_as_stiff
@@ -42,6 +43,7 @@ from sysid.models.twin import with_impact_as_stiff
 _MARGIN = 0.7  # of the greatest force and torque that a task allows
 _LOOKED_AT = 8  # experiments, of which the best is likely to be one
 _EVERY = 4  # steps of an experiment at which joint limits are looked at
+_BETWEEN = 20.0  # s from one to the next: the way back, zeroing, a verdict
 _LEVER = 0.02  # m, at which an error of the force turns the bolt
 
 
@@ -54,6 +56,7 @@ class Prediction:
         performances: of each rival, on the twin.
         replayed: of each rival, with the actions of the first rival's.
         distances: (k, k) between rivals, in standard deviations.
+        needed: (k, k) at which a verdict would tell them apart.
         sigma: (12,) by which a measured state may differ anyway.
         hazard: why it is not performed, in words; empty if it may be.
         value: error probability that it takes away, per second.
@@ -63,6 +66,7 @@ class Prediction:
     performances: tuple[Performance, ...]
     replayed: tuple[Performance, ...]
     distances: Array
+    needed: Array
     sigma: Array
     hazard: str
     value: float
@@ -93,7 +97,7 @@ class Prediction:
 def predict(
     plans: Sequence[Plan],
     rivals: Sequence[Rival],
-    needed: float,
+    need: Need,
     progress: Progress,
 ) -> list[Prediction]:
     """Returns what rivals predict of experiments, the best first.
@@ -104,22 +108,21 @@ def predict(
     Args:
         plans: experiments on the rivals' scenario.
         rivals: at least two.
-        needed: distance at which a verdict tells two rivals apart, d0.
+        need: how far apart they have to be.
         progress: gets each simulation.
     """
     known = [dataclasses.replace(rival, varied=()) for rival in rivals]
-    order = [each.plan for each in _predictions(plans, known, needed, progress)]
-    found = _predictions(order[:_LOOKED_AT], rivals, needed, progress)
-    helpful = [each for each in found if each.is_helpful]
-    if order[_LOOKED_AT:] and together(helpful, math.inf) < needed:
-        found += _predictions(order[_LOOKED_AT:], rivals, needed, progress)
+    order = [each.plan for each in _predictions(plans, known, need, progress)]
+    found = _predictions(order[:_LOOKED_AT], rivals, need, progress)
+    if order[_LOOKED_AT:] and not is_enough(found, rivals, need, math.inf):
+        found += _predictions(order[_LOOKED_AT:], rivals, need, progress)
     return sorted(found, key=lambda each: -each.value)
 
 
 def _predictions(
     plans: Sequence[Plan],
     rivals: Sequence[Rival],
-    needed: float,
+    need: Need,
     progress: Progress,
 ) -> list[Prediction]:
     """Returns what rivals predict of experiments, the best first; see `predict`."""
@@ -142,26 +145,39 @@ def _predictions(
         duration = max(each.duration for each in done)
         distances = _distances(same, sigma)
         hazard = _hazard(done, rivals, reach)
+        needed = need.distances(rivals, round(duration / plan.period))
         gain = 0.0 if hazard else _gain(distances / needed, weights)
-        value = gain / max(duration, plan.period)
+        value = gain / (duration + _BETWEEN)
         shown = tuple(own[0] for own in same)
-        found.append(Prediction(plan, done, shown, distances, sigma, hazard, value))
+        found.append(
+            Prediction(plan, done, shown, distances, needed, sigma, hazard, value)
+        )
     return sorted(found, key=lambda each: -each.value)
 
 
-def together(predictions: Sequence[Prediction], left: float) -> float:
-    """Returns how far experiments one after the other separate two rivals.
+def is_enough(
+    predictions: Sequence[Prediction],
+    rivals: Sequence[Rival],
+    need: Need,
+    left: float,
+) -> bool:
+    """Returns whether experiments one after the other tell two rivals apart.
 
     Args:
         predictions: of experiments, the best first.
+        rivals: of which they are.
+        need: how far apart they have to be.
         left: robot time [s]; those are left out that it is too short for.
     """
-    squares: float | Array = 0.0
+    squares, rows = np.zeros((len(rivals), len(rivals))), 0
     for each in predictions:
-        if each.duration <= left:
+        if each.is_helpful and each.duration <= left:
             left -= each.duration
-            squares = squares + each.distances**2
-    return float(np.sqrt(np.max(squares)))
+            squares += each.distances**2
+            rows += round(each.duration / each.plan.period)
+            if (squares >= need.distances(rivals, rows) ** 2).any():
+                return True
+    return False
 
 
 def _performed(

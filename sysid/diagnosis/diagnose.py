@@ -14,9 +14,9 @@ from drake_disasm.experiments import Experiment, Plan, Removal, registered_exper
 from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.scenario import Scenario, scenario_to_mapping
 from drake_disasm.task.simulation import StationFactory
-from sysid.diagnosis.design import Prediction, predict, together
+from sysid.diagnosis.design import Prediction, is_enough, predict
 from sysid.diagnosis.growing_log import GrowingLog
-from sysid.diagnosis.rivals import NOTHING, Rival, needed_distance, rivals_of
+from sysid.diagnosis.rivals import NOTHING, Need, Rival, rivals_of
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.workers import Workers
 
@@ -151,10 +151,10 @@ def diagnose(
     while True:
         closed, model = session.log.verdict(effects, workers, budget.verdict, fits)
         rivals = rivals_of(closed, model, workers, fits)
-        needed = needed_distance(closed)
-        predictions = session.predict(plans, rivals, needed)
+        need = Need.of(closed)
+        predictions = session.predict(plans, rivals, need)
         left = budget.robot - session.robot_time
-        best, reason = _choice(closed, rivals, predictions, needed, left)
+        best, reason = _choice(closed, rivals, predictions, need, left)
         if best is not None and not confirm(_question(best)):
             best, reason = None, "stopped by hand; the same command goes on from here"
         if best is None:
@@ -182,7 +182,7 @@ def _choice(
     closed: ClosedLoop,
     rivals: Sequence[Rival],
     predictions: Sequence[Prediction],
-    needed: float,
+    need: Need,
     left: float,
 ) -> tuple[Prediction | None, str]:
     """Returns the experiment to perform, or why there is none.
@@ -191,16 +191,15 @@ def _choice(
         closed: the verdict.
         rivals: that it leaves.
         predictions: of experiments that were not performed yet, the best first.
-        needed: distance at which a verdict tells two rivals apart.
+        need: how far apart rivals have to be.
         left: robot time [s].
     """
     if len(rivals) < 2:
         return None, _settled(closed)
-    helpful = [p for p in predictions if p.is_helpful]
-    if together(helpful, math.inf) < needed:
-        return None, _inseparable(rivals, predictions, needed)
-    affordable = [p for p in helpful if p.duration <= left]
-    if not affordable or together(affordable, left) < needed:
+    if not is_enough(predictions, rivals, need, math.inf):
+        return None, _inseparable(rivals, predictions)
+    affordable = [p for p in predictions if p.is_helpful and p.duration <= left]
+    if not is_enough(affordable, rivals, need, left):
         return None, (
             f"the budget is spent: with the {left:.0f} s that are left no experiments "
             f"separate {_first_two(rivals)}"
@@ -220,9 +219,7 @@ def _first_two(rivals: Sequence[Rival]) -> str:
     return " and ".join(rival.name for rival in rivals[:2])
 
 
-def _inseparable(
-    rivals: Sequence[Rival], predictions: Sequence[Prediction], needed: float
-) -> str:
+def _inseparable(rivals: Sequence[Rival], predictions: Sequence[Prediction]) -> str:
     """Returns why no experiment is performed, with the proof."""
     names = _first_two(rivals)
     safe = [p for p in predictions if not p.hazard]
@@ -233,7 +230,7 @@ def _inseparable(
     return (
         f"no experiment separates {names}: the largest difference that any predicts is "
         f"{most.farthest:.1f} standard deviations, of {most.plan.text}, and the "
-        f"verdict needs {needed:.1f}"
+        f"verdict needs {most.needed.flat[most.distances.argmax()]:.1f}"
     )
 
 
@@ -293,14 +290,14 @@ class _Session:
             self._write("")
 
     def predict(
-        self, plans: Sequence[Plan], rivals: Sequence[Rival], needed: float
+        self, plans: Sequence[Plan], rivals: Sequence[Rival], need: Need
     ) -> list[Prediction]:
         """Returns what rivals predict of experiments that were not performed yet."""
         if len(rivals) < 2:
             return []
         done = {each.experiment for each in self.rounds}
         left = [plan for plan in plans if plan.text not in done]
-        return predict(left, rivals, needed, self._progress)
+        return predict(left, rivals, need, self._progress)
 
     def experiment(
         self, closed: ClosedLoop, rivals: Sequence[Rival], chosen: Prediction

@@ -15,7 +15,7 @@ from sysid.effect_selection.effect_names import effect_class
 from sysid.fitting.candidates import Candidate, candidates
 from sysid.fitting.fit import Fit
 from sysid.fitting.fitter import Fitter
-from sysid.models.base import LogModel
+from sysid.models.base import Array, LogModel
 from sysid.parameters import Scaling
 from sysid.workers import Workers
 
@@ -45,12 +45,52 @@ class Rival:
             same for each; of what the log could not have shown, the same for each.
         varied: the scenario with one parameter of its effects changed by a standard
             deviation, one after the other.
+        loss: that it leaves of rows of the log that it was not fitted to.
     """
 
     name: str
     scenario: Scenario
     weight: float
     varied: tuple[Scenario, ...] = ()
+    loss: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Need:
+    """How far apart two rivals have to be for a verdict to tell them apart.
+
+    One has to leave so much more of the loss as the margin of ambiguity asks
+    (`Gain.is_about_as_good_as`), a share of what is left: each row adds to it, too. And
+    more than chance.
+
+    Attributes:
+        margin: of the log so far.
+        of_row: of each row that is added.
+    """
+
+    margin: float
+    of_row: float = 0.0
+
+    @classmethod
+    def of(cls, closed: ClosedLoop) -> "Need":
+        """Returns what a verdict needs."""
+        left = closed.last.loss
+        taken = max(closed.first.loss - left, 0.0)
+        margin = closed.last.settings.ambiguity_margin * min(taken, left)
+        return cls(margin, margin / closed.last.model.measurements.rows)
+
+    def distances(self, rivals: Sequence[Rival], rows: int) -> Array:
+        """Returns how far apart rivals have to be (k, k) in experiments to come.
+
+        In standard deviations; whichever is ahead in the log so far keeps that.
+
+        Args:
+            rivals: k of them.
+            rows: of the experiments.
+        """
+        loss = np.array([rival.loss for rival in rivals])
+        missing = self.margin + self.of_row * rows - np.abs(loss[:, None] - loss)
+        return np.sqrt(np.maximum(missing, BY_CHANCE**2))
 
 
 def rivals_of(
@@ -81,20 +121,9 @@ def rivals_of(
         if scenario is not None:
             name = " and ".join(e.name for e in effects) or NOTHING
             weight = 0.5 * (share + equal) if is_ambiguous else max(share, _LEAST)
-            found.append(Rival(name, scenario, weight, tuple(_varied(fit))))
+            loss = float(fit.held_out_losses.sum())
+            found.append(Rival(name, scenario, weight, tuple(_varied(fit)), loss))
     return tuple(sorted(found, key=lambda rival: -rival.weight))
-
-
-def needed_distance(closed: ClosedLoop) -> float:
-    """Returns how far apart two rivals have to be for a verdict to tell them apart [1].
-
-    One has to take away as much more of the loss as the margin of ambiguity asks
-    (`Gain.is_about_as_good_as`), and more than chance.
-    """
-    left = closed.last.loss
-    taken = max(closed.first.loss - left, 0.0)
-    margin = closed.last.settings.ambiguity_margin * min(taken, left)
-    return max(BY_CHANCE, float(np.sqrt(margin)))
 
 
 def _varied(fit: Fit) -> Iterator[Scenario]:

@@ -23,6 +23,7 @@ from sysid.effect_selection.replication import (
     votes_of_gains,
     votes_of_selections,
 )
+from sysid.effect_selection.rival_fits import judged_by_all_rows
 from sysid.fitting.candidates import Candidate
 from sysid.fitting.fit import Fit
 from sysid.fitting.fitter import Fitter
@@ -191,6 +192,9 @@ def _refit_search(
         _say(progress, "fitting all rows")
         exact = fitter.with_exact_derivatives() if fitter.base.costly else fitter
         first, last = exact.fit(()), exact.fit(reached.effects, reached)
+    steps = selection.steps
+    if few is not fitter and not fitter.base.costly:
+        steps = judged_by_all_rows(fitter, last, steps, deadline)
     is_complete = selection.is_complete and time.monotonic() < deadline
     _say(progress, f"comparing {len(library)} candidates with the effects")
     system = linear_system(few, reached, library, deadline)
@@ -198,7 +202,7 @@ def _refit_search(
     placed = standings(
         account,
         votes_of_gains(account),
-        _rivals(selection.steps),
+        _rivals(steps),
         reached.effects,
         len(fitter.base.measurements.names),
     )
@@ -207,7 +211,7 @@ def _refit_search(
         last,
         selection.begin,
         account,
-        tuple(selection.steps),
+        tuple(steps),
         placed,
         system.untested,
         is_complete,

@@ -10,8 +10,9 @@ from drake_disasm.effects import GroovePose, SensorBias, SensorDrift, SensorWarm
 from drake_disasm.experiments import Presses, Rest, Reversals
 from drake_disasm.scenario import load_scenario
 from sysid.diagnosis.design import mahalanobis, predict
-from sysid.diagnosis.rivals import Rival, best_of_folds
+from sysid.diagnosis.rivals import Need, Rival, best_of_folds
 
+NEED = Need(25.0)
 IMPACT = load_scenario("removal", ["contact.model=impact"])
 
 
@@ -43,7 +44,7 @@ def test_a_drift_and_a_settling_reading_are_told_apart_by_waiting() -> None:
         rival("warm-up", SensorWarmUp(fz=1.0, time_constant=10.0)),
     ]
     plans = [Rest(20.0).plan(IMPACT), Presses("z", 2.0, 1).plan(IMPACT)]
-    found = {p.plan.text: p for p in predict(plans, rivals, 5.0, ignore_progress)}
+    found = {p.plan.text: p for p in predict(plans, rivals, NEED, ignore_progress)}
     rest, press = (found[plan.text] for plan in plans)
     assert rest.farthest > press.farthest > 0.0
     assert rest.channel == 7 and rest.hazard == ""  # z of S is y of G
@@ -55,8 +56,8 @@ def test_what_fits_may_make_up_is_no_difference() -> None:
     varied = dataclasses.replace(IMPACT, effects=[SensorBias(fz=0.8)])
     loose = dataclasses.replace(known, varied=(varied,))
     plans = [Rest(5.0).plan(IMPACT)]
-    [tight] = predict(plans, [known, other], 5.0, ignore_progress)
-    [free] = predict(plans, [loose, other], 5.0, ignore_progress)
+    [tight] = predict(plans, [known, other], NEED, ignore_progress)
+    [free] = predict(plans, [loose, other], NEED, ignore_progress)
     assert free.farthest <= 1.0 + 1e-6 or free.farthest < 0.2 * tight.farthest
 
 
@@ -67,7 +68,7 @@ def test_an_experiment_that_one_rival_makes_dangerous_is_not_performed() -> None
         Reversals(way=0.8, times=1, speed=1.0).plan(IMPACT),
         Rest(1.0).plan(IMPACT),
     ]
-    found = {p.plan.text: p for p in predict(plans, rivals, 5.0, ignore_progress)}
+    found = {p.plan.text: p for p in predict(plans, rivals, NEED, ignore_progress)}
     stroke = found[plans[0].text]
     assert "under turned" in stroke.hazard and stroke.value == 0.0
     assert found[plans[1].text].hazard == ""
