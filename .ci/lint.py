@@ -72,6 +72,7 @@ LONGEST_EXAMPLE = 100  # lines
 MOST_WORDS, LONGEST_PAGE = 20_000, 1500
 GENERATED = (
     *("docs/reference/api/", "docs/results/", "docs/reference/effects.md"),
+    "docs/reference/experiments.md",
     *("docs/reference/command-line.md", "docs/reference/scenario.md"),
     "docs/reference/settings.md",
 )

@@ -79,7 +79,7 @@ def _performed(
         plan = next(plans)
         done.append(log.perform(plan))
         texts.append(plan.text)
-    closed, _ = log.verdict(library(), fits=folder / "fits")
+    closed = log.verdict(library(), fits=folder / "fits")
     return Answer.of(
         closed,
         robot_time=sum(each.duration for each in done),

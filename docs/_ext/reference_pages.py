@@ -1,8 +1,8 @@
 """Writes the pages of docs/reference that are made of the code itself.
 
-`python docs/_ext/reference_pages.py` (or `make reference`) writes effects.md from the
-registry, scenario.md and settings.md from the fields of dataclasses, and
-command-line.md from the programs' parsers.
+`python docs/_ext/reference_pages.py` (or `make reference`) writes effects.md and
+experiments.md from their registries, scenario.md and settings.md from the fields of
+dataclasses, and command-line.md from the programs' parsers.
 """
 
 import argparse
@@ -21,6 +21,7 @@ from drake_disasm_cli.main import COMMANDS
 from drake_disasm.common.files import write_text
 from drake_disasm.effects import registered_effects
 from drake_disasm.effects.documentation import documentation
+from drake_disasm.experiments import registered_experiments
 from drake_disasm.learning.hyperparameters import Hyperparameters
 from drake_disasm.parts import registered_parts
 from drake_disasm.scenario.schema import Scenario
@@ -41,6 +42,11 @@ An **amplitude** is zero where the effect vanishes. A **shape parameter** says h
 effect looks; its default is in brackets. Effects of the sensor act in the order load,
 mounting, elements, electronics, range, report, whatever their order in the list.
 [Your own effect](../guides/own-effect.md) adds one."""
+_EXPERIMENTS = """# Experiments
+
+A station performs an experiment to find out what its model lacks:
+[`drake-disasm diagnose`](../guides/diagnose.md) chooses among them, in all combinations
+of the values in brackets."""
 _SCENARIO = """# Scenario
 
 A scenario is a YAML file that defines one Drake diagram, or a family of them. Every key
@@ -81,6 +87,7 @@ def pages() -> dict[str, str]:
     """Returns the Markdown of each page, by file name."""
     return {
         "effects.md": _page(_EFFECTS, effects()),
+        "experiments.md": _page(_EXPERIMENTS, "\n".join(_experiments())),
         "scenario.md": _page(
             _SCENARIO, "\n".join([*_sections(Scenario, 2), *_parts()])
         ),
@@ -97,6 +104,29 @@ def effects() -> str:
     """Returns every effect of the library, in sections by where it acts."""
     library = [e for e in registered_effects() if e.__module__.startswith("drake_dis")]
     return documentation(library)
+
+
+def _experiments() -> Iterator[str]:
+    """Yields the experiments of the library, each as a section."""
+    for kind in registered_experiments():
+        if kind.__module__.startswith("drake_disasm."):
+            text = inspect.getdoc(kind) or ""
+            yield from (f"## {kind.__name__}", "", text, "")
+            if kind.needs:
+                yield from (f"Needs {kind.needs}.", "")
+            rows = [
+                (*row[:-1], row[-1] + _tried(field))
+                for row, field in zip(
+                    quantity_rows(kind), dataclasses.fields(kind), strict=True
+                )
+            ]
+            yield from _table(QUANTITY_HEAD, rows)
+
+
+def _tried(field: dataclasses.Field[Any]) -> str:
+    """Returns the values of a parameter that are tried, in brackets."""
+    values = field.metadata["grid"]
+    return f" ({', '.join(f'{value:g}' for value in values)})" if values else ""
 
 
 def _sections(schema: type, depth: int, name: str = "") -> Iterator[str]:

@@ -149,8 +149,8 @@ def diagnose(
     session.record_first(budget, confirm)
     plans = _plans(scenario, experiments)
     while True:
-        closed, model = session.log.verdict(effects, workers, budget.verdict, fits)
-        rivals = rivals_of(closed, model, workers, fits)
+        closed = session.log.verdict(effects, workers, budget.verdict, fits)
+        rivals = rivals_of(closed, session.log, workers, fits)
         need = Need.of(closed)
         predictions = session.predict(plans, rivals, need)
         left = budget.robot - session.robot_time

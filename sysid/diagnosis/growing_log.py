@@ -67,8 +67,8 @@ class GrowingLog:
         workers: Workers | None = None,
         time_budget: float = math.inf,
         fits: Path | None = None,
-    ) -> tuple[ClosedLoop, LogModel]:
-        """Returns the verdict on the log so far, and the model of it.
+    ) -> ClosedLoop:
+        """Returns the verdict on the log so far.
 
         Every episode is fitted, contiguous blocks are held out in turn: an experiment
         is made to be learned from.
@@ -79,11 +79,9 @@ class GrowingLog:
             time_budget: see close_loop [s].
             fits: folder of a cache of them.
         """
-        log = read_log(self._folder)
-        model = model_of([log], ModelChoice(scenario=self._scenario, fixed=True))
-        closed = close_loop(
-            model,
-            train=range(len(log.episodes)),
+        return close_loop(
+            self.model(),
+            train=range(self.episodes),
             test=(),
             library=effects,
             workers=workers,
@@ -91,4 +89,12 @@ class GrowingLog:
             folder=fits,
             time_budget=time_budget,
         )
-        return closed, model
+
+    def model(self, scenario: Scenario | None = None) -> LogModel:
+        """Returns the model of the log so far, with the effects of a scenario.
+
+        Args:
+            scenario: of the model; the stated one if left out.
+        """
+        choice = ModelChoice(scenario=scenario or self._scenario, fixed=True)
+        return model_of([read_log(self._folder)], choice)

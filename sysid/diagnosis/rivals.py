@@ -9,6 +9,7 @@ import numpy as np
 
 from drake_disasm.effects import Effect
 from drake_disasm.scenario import Scenario
+from sysid.diagnosis.growing_log import GrowingLog
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effect_class
@@ -16,6 +17,7 @@ from sysid.fitting.candidates import Candidate, candidates
 from sysid.fitting.fit import Fit
 from sysid.fitting.fitter import Fitter
 from sysid.models.base import Array, LogModel
+from sysid.objective import pseudo_residual
 from sysid.parameters import Scaling
 from sysid.workers import Workers
 
@@ -94,19 +96,20 @@ class Need:
 
 
 def rivals_of(
-    closed: ClosedLoop, model: LogModel, workers: Workers, folder: Path | None = None
+    closed: ClosedLoop, log: GrowingLog, workers: Workers, folder: Path | None = None
 ) -> tuple[Rival, ...]:
     """Returns the hypotheses that are left; one alone is settled.
 
     Args:
         closed: the verdict.
-        model: of the whole log.
+        log: on which it is.
         workers: fit.
         folder: of a cache of fits.
     """
     verdict = closed.verdict
     if not (verdict.ambiguous or verdict.suggested):
-        return _unseen(closed)
+        return _unseen(closed, log)
+    model = log.model()
     delta = model.default_huber_delta
     fitter = Fitter.of(model, workers, delta, closed.last.settings, folder)
     sets = list(_sets(closed, candidates(model)))
@@ -129,7 +132,7 @@ def rivals_of(
 def _varied(fit: Fit) -> Iterator[Scenario]:
     """Yields a fit's scenario with one parameter of its effects changed."""
     scaling, u = Scaling(fit.model.parameters), fit.linearisation.u
-    sigma = (fit.half_intervals + fit.error_of_model) / _NORMAL
+    sigma = fit.half_intervals / _NORMAL
     for i in range(len(u)):
         moved = u.copy()
         moved[i] += sigma[i] if u[i] + sigma[i] <= 1.0 else -sigma[i]
@@ -184,21 +187,31 @@ def _shaped(closed: ClosedLoop, name: str, library: Sequence[Candidate]) -> Cand
     return next(each for each in library if each.name == name)
 
 
-def _unseen(closed: ClosedLoop) -> tuple[Rival, ...]:
-    """Returns the verdict, and what its log could not have shown, each as a rival."""
+def _unseen(closed: ClosedLoop, log: GrowingLog) -> tuple[Rival, ...]:
+    """Returns the verdict, and what its log does not speak against, each as a rival.
+
+    Where something is named, that is all that was asked.
+    """
     scenario = closed.scenario
     if scenario is None:
         return ()
-    known = " and ".join(closed.verdict.confirmed) or NOTHING
-    hidden = sorted(closed.verdict.undetectable)[:_MOST]
-    rivals = [Rival(known, scenario, 1.0 / (1 + len(hidden)))]
-    for kind in hidden:
+    if closed.verdict.confirmed:
+        return (Rival(" and ".join(closed.verdict.confirmed), scenario, 1.0),)
+    found = [Rival(NOTHING, scenario, 1.0, loss=_loss(log.model(scenario)))]
+    for kind in sorted(closed.verdict.undetectable)[:_MOST]:
         effect = _of_size(kind, closed.verdict.limits)
         if effect is not None:
             more = dataclasses.replace(scenario, effects=[*scenario.effects, effect])
-            name = kind if known == NOTHING else f"{known} and {kind}"
-            rivals.append(Rival(name, more, rivals[0].weight))
-    return tuple(rivals)
+            loss = _loss(log.model(more))
+            if loss - found[0].loss < BY_CHANCE**2:
+                found.append(Rival(kind, more, 1.0, loss=loss))
+    return tuple(dataclasses.replace(each, weight=1.0 / len(found)) for each in found)
+
+
+def _loss(model: LogModel) -> float:
+    """Returns the loss that a model without parameters leaves."""
+    error = model.measurements.weighted(model.predictions(np.zeros(0)))
+    return float(np.sum(pseudo_residual(error, model.default_huber_delta) ** 2))
 
 
 def _of_size(kind: str, limits: Sequence[DetectionLimit]) -> Effect | None:

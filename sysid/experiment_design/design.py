@@ -11,11 +11,7 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from sysid.experiment_design.arm_limits import CollisionFreeSpace, JointLimits
 from sysid.experiment_design.fourier import FourierMotion
-from sysid.experiment_design.information import (
-    ArmExperiment,
-    condition_of,
-    uncertainty_of,
-)
+from sysid.experiment_design.information import ArmExperiment, condition_of
 
 Array = NDArray[np.float64]
 
@@ -57,7 +53,7 @@ class Figures:
     """How well a motion shows the unknowns.
 
     Attributes:
-        criterion: see `uncertainty_of`.
+        criterion: see `ArmExperiment.criterion`.
         condition: see `condition_of`.
     """
 
@@ -65,9 +61,9 @@ class Figures:
     condition: float
 
     @classmethod
-    def of(cls, information: Array) -> Self:
+    def of(cls, experiment: ArmExperiment, information: Array) -> Self:
         """Returns those of an information matrix."""
-        return cls(uncertainty_of(information), condition_of(information))
+        return cls(experiment.criterion(information), condition_of(information))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,7 +125,9 @@ def design_motion(
         )
     best = points[int(np.argmin(values))]
     found = _improved(search, best, settings.iterations, progress)
-    random_ones = [Figures.of(search.information(search.motion(p))) for p in points]
+    random_ones = [
+        Figures.of(experiment, search.information(search.motion(p))) for p in points
+    ]
     median = Figures(
         float(np.median([f.criterion for f in random_ones])),
         float(np.median([f.condition for f in random_ones])),
@@ -201,7 +199,7 @@ class _Search:
         """Returns the criterion of a point's motion, with penalties."""
         motion = self.motion(point)
         excess = self._excess(*motion.states(self._time))
-        told = uncertainty_of(self.information(motion))
+        told = self._experiment.criterion(self.information(motion))
         return told + _PENALTY * float(excess @ excess)
 
     def information(self, motion: FourierMotion, time: Array | None = None) -> Array:
@@ -253,7 +251,7 @@ class _Search:
         return Design(
             motion,
             before,
-            Figures.of(information),
+            Figures.of(self._experiment, information),
             self._experiment.spreads(information),
             used,
             float(self._workspace.clearance(q).min()),

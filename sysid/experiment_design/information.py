@@ -56,6 +56,8 @@ class ArmExperiment:
         kinds: names of effects, each at every joint where it can act.
         noise: (joints,) standard deviation of each joint's torque.
         duration: of the motion [s].
+        separate: names of two effects that a motion is to tell apart, before it is to
+            show all else.
 
     Raises:
         DisasmError: there is no such effect of arms.
@@ -68,8 +70,11 @@ class ArmExperiment:
         kinds: Sequence[str],
         noise: Array,
         duration: float,
+        separate: tuple[str, str] | None = None,
     ) -> None:
-        self.joints = tuple(joints)
+        self.joints, self._separate = tuple(joints), separate
+        if separate:
+            kinds = [*kinds, *separate]
         self._arm = ArmRegressor(urdf, joints)
         self._base = base_set(self._arm.random_regressor())
         self._noise = noise
@@ -122,6 +127,22 @@ class ArmExperiment:
         scaled = (columns / self._noise[:, None]).reshape(-1, columns.shape[-1])
         return np.asarray(scaled.T @ scaled * (rows / len(columns)))
 
+    def criterion(self, information: Array) -> float:
+        """Returns how little a recording tells: least is best."""
+        if self._separate is None:
+            return uncertainty_of(information)
+        kinds = [""] * (len(self.unknowns) - len(self._amplitudes))
+        kinds += [type(effect).__name__ for effect, _ in self._amplitudes]
+        return confusion_of(information, [np.array(kinds) == k for k in self._separate])
+
+    @property
+    def criterion_name(self) -> str:
+        """What `criterion` is, in words."""
+        if self._separate is None:
+            return "-log det / unknown"
+        one, other = self._separate
+        return f"-log det / unknown of what separates {one} and {other}"
+
     def spreads(self, information: Array) -> Array:
         """Returns half the 95 % interval (unknowns,) of each unknown."""
         size = np.sqrt(np.maximum(np.diagonal(information), 1e-300))
@@ -138,6 +159,27 @@ def uncertainty_of(information: Array) -> float:
     size = len(information)
     ridge = _RIDGE * np.diag(np.maximum(np.diagonal(information), 1e-300))
     return float(-np.linalg.slogdet(information + ridge)[1] / size)
+
+
+def confusion_of(information: Array, kinds: Sequence[Array]) -> float:
+    """Returns how badly some effects are told from each other: least is best.
+
+    -log det of what each effect's amplitudes do that neither base parameters nor the
+    other effects can do in their place, per amplitude: D_s-optimality, which for models
+    that are linear in what tells them apart is T-optimality (Atkinson and Fedorov, "The
+    design of experiments for discriminating between two rival models", 1975).
+
+    Args:
+        information: matrix (unknowns, unknowns).
+        kinds: of each effect, which unknowns are its amplitudes (unknowns,).
+    """
+    size = len(information)
+    whole = size * uncertainty_of(information)
+    found = 0.0
+    for kind in kinds:
+        rest = information[np.ix_(~kind, ~kind)]
+        found += whole - len(rest) * uncertainty_of(rest)
+    return float(found / sum(int(kind.sum()) for kind in kinds))
 
 
 def condition_of(information: Array) -> float:

@@ -106,9 +106,9 @@ def summary(design: Design, experiment: ArmExperiment) -> Iterator[str]:
     """Yields what was designed in lines."""
     before, after = design.before, design.after
     yield (
-        f"criterion -log det / unknown: {after.criterion:.4g}, condition number "
-        f"{after.condition:.3g}; the median random motion: {before.criterion:.4g} and "
-        f"{before.condition:.3g}, its intervals about "
+        f"criterion {experiment.criterion_name}: {after.criterion:.4g}, condition "
+        f"number {after.condition:.3g}; the median random motion: "
+        f"{before.criterion:.4g} and {before.condition:.3g}, its intervals about "
         f"{np.exp(0.5 * (before.criterion - after.criterion)):.3g} times as wide"
     )
     for name, share in design.used.items():

@@ -17,6 +17,8 @@ Exit status: 0 if one hypothesis is left, 3 if not, 2 for input that can't be us
 
 import argparse
 import contextlib
+import copy
+import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -24,7 +26,8 @@ from pathlib import Path
 from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_text
-from drake_disasm.experiments import find_experiment, registered_experiments
+from drake_disasm.common.user_code import import_named
+from drake_disasm.experiments import Experiment, find_experiment, registered_experiments
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.task.simulation import StationFactory
 from drake_disasm_cli import common, hardware
@@ -37,7 +40,7 @@ EXIT_OPEN = 3
 _MINUTE = 60.0  # s
 _EXAMPLES = """examples:
   drake-disasm diagnose --scenario removal --hidden removal_turned --yes \\
-      --out out/diagnosis
+      --contact impact --out out/diagnosis
   drake-disasm diagnose --station twin --scenario iiwa_peg --yes --robot-time 120 \\
       --verdict-time 5 --out out/peg
   drake-disasm diagnose --station hardware --hardware-config cell.yaml \\
@@ -54,6 +57,13 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         add, "cell", "on which experiments are performed", hardware=True
     )
     hardware.add_config_argument(add)
+    add(
+        "--contact",
+        choices=("impact", "hydroelastic"),
+        help="of the twin that judges and predicts: impact takes a minute where "
+        "hydroelastic takes ten, and differs more from the cell (default: the "
+        "scenario's)",
+    )
     common.add_hidden_argument(add)
     _add_budget_arguments(add)
     add("--yes", action="store_true", help="perform each experiment without asking")
@@ -81,8 +91,9 @@ def _add_budget_arguments(add: Callable[..., object]) -> None:
     add(
         "--experiments",
         nargs="+",
-        metavar="NAME",
-        help=f"to choose from: {names} (default: all of them)",
+        metavar="NAME|FILE.py",
+        help=f"to choose from: {names}, or all of a file of your own "
+        "(@register_experiment; default: all of these)",
     )
 
 
@@ -91,7 +102,10 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     hardware.refuse_contradictions(args, ["hardware_config"], {"hidden": None})
     scenario = load_scenario(args.scenario, args.overrides)
-    kinds = args.experiments and [find_experiment(n) for n in args.experiments]
+    real = common.real_scenario(args, scenario)
+    model = dataclasses.replace(scenario, contact=copy.copy(scenario.contact))
+    model.contact.model = args.contact or scenario.contact.model
+    kinds = [kind for name in args.experiments or () for kind in _experiments(name)]
     budget = Budget(args.robot_time, _MINUTE * args.verdict_time)
     with (
         program.ProgressBar(unit="simulation") as progress,
@@ -99,12 +113,12 @@ def main(arguments: Sequence[str]) -> int:
         _station(args, scenario) as station,
     ):
         found = diagnose(
-            scenario,
+            model,
             args.out,
             station=station,
-            real=common.real_scenario(args, scenario),
+            real=real,
             budget=budget,
-            experiments=kinds,
+            experiments=kinds or None,
             confirm=(lambda _: True) if args.yes else _asked,
             workers=workers,
             progress=progress,
@@ -114,6 +128,23 @@ def main(arguments: Sequence[str]) -> int:
     print(_text(found))
     print(f"report: {args.out / 'report.html'}")
     return 0 if found.is_settled else EXIT_OPEN
+
+
+def _experiments(name: str) -> list[type[Experiment]]:
+    """Returns the experiment of a name, or those of a file.
+
+    Raises:
+        DisasmError: there is none.
+    """
+    if not name.endswith(".py"):
+        return [find_experiment(name)]
+    module = import_named(name, "experiments").__name__
+    found = [kind for kind in registered_experiments() if kind.__module__ == module]
+    if not found:
+        raise DisasmError(
+            f"{name}: registers no experiment; put @register_experiment above the class"
+        )
+    return found
 
 
 @contextlib.contextmanager

@@ -36,6 +36,9 @@ _EXAMPLES = """examples:
       --floor 0.1 --effects JointCoulombFriction JointViscousFriction --out out/motion
   drake-disasm excite --scenario removal --out out/cell_motion
                                   for the cell: see `drake-disasm play-motion`
+  drake-disasm excite --urdf arm.urdf --separate JointCoulombFriction \\
+      JointStribeckFriction --out out/motion
+                                  for a verdict that can't tell these two apart
   drake-disasm excite --urdf arm.urdf --duration 10 --harmonics 8 --margin 0.3 \\
       --out out/motion                     shorter, livelier, farther from limits
 """
@@ -68,6 +71,13 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         metavar="EFFECT",
         help="effects to show beside the base parameters, each at every joint: "
         f"{', '.join(arm_effects())} (default: dry and viscous friction)",
+    )
+    add(
+        "--separate",
+        nargs=2,
+        metavar="EFFECT",
+        help="two effects that the motion is to tell apart, before it is to show all "
+        "else: rivals of a verdict, say",
     )
     _add_motion_arguments(add)
     _add_limit_arguments(add)
@@ -150,6 +160,8 @@ def main(arguments: Sequence[str]) -> int:
         raise DisasmError(
             "--harmonics: two of them end at rest only by resting; give 3"
         )
+    if args.separate and args.separate[0] == args.separate[1]:
+        raise DisasmError("--separate: an effect can't be told from itself; name two")
     if args.margin >= 0.5:
         raise DisasmError("--margin: 0.5 leaves nothing at either end; give less")
     with _arm(args) as urdf:
@@ -165,7 +177,10 @@ def _design(args: argparse.Namespace, arguments: Sequence[str], urdf: str) -> No
     if not workspace.has_geometry:
         print("the URDF has no collision geometry: collisions are not looked for")
     noise = args.torque_noise * np.array(limits.effort)
-    experiment = ArmExperiment(urdf, joints, args.effects, noise, args.duration)
+    separate = args.separate and tuple(args.separate)
+    experiment = ArmExperiment(
+        urdf, joints, args.effects, noise, args.duration, separate
+    )
     settings = DesignSettings(
         duration=args.duration,
         harmonics=args.harmonics,

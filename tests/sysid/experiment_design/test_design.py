@@ -8,6 +8,7 @@ from sysid.experiment_design.design import DesignSettings, design_motion
 from sysid.experiment_design.information import (
     ArmExperiment,
     condition_of,
+    confusion_of,
     uncertainty_of,
 )
 from tests.refusals import refused
@@ -93,6 +94,30 @@ def test_units_change_the_criterion_by_a_constant():
     before = uncertainty_of(one) - uncertainty_of(other)
     after = uncertainty_of(scale @ one @ scale) - uncertainty_of(scale @ other @ scale)
     assert after == pytest.approx(before, rel=1e-6)
+
+
+def test_what_another_effect_does_as_well_separates_nothing():
+    """Two columns with the correlation r leave 1 - r^2 of each other."""
+    r = 0.8
+    information = np.array([[1.0, r, 0.0], [r, 1.0, 0.0], [0.0, 0.0, 4.0]])
+    kinds = [np.arange(3) == 0, np.arange(3) == 1]
+    expected = -np.log(1.0 - r**2)
+    assert confusion_of(information, kinds) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_motion_separates_two_effects_better_than_one_that_shows_all(
+    urdf, limits, design
+):
+    rivals = ("JointCoulombFriction", "JointStribeckFriction")
+    experiment = ArmExperiment(urdf, JOINTS, _KINDS, _NOISE, _SETTINGS.duration, rivals)
+    workspace = CollisionFreeSpace(urdf, JOINTS, limits)
+    found = design_motion(experiment, limits, workspace, _SETTINGS)
+    time = np.linspace(0.0, _SETTINGS.duration, 400)
+    columns = experiment.columns(time, *design.motion.states(time))
+    rows = int(_SETTINGS.duration * _SETTINGS.rate)
+    usual = experiment.criterion(experiment.information(columns, rows))
+    assert found.after.criterion < usual - 0.3
+    assert "JointStribeckFriction" in experiment.criterion_name
 
 
 def test_the_condition_number_is_the_scaled_regressors():
