@@ -97,7 +97,7 @@ class Presses(Experiment):
 
     axis: str = quantity("z", "", "of G, of the force", choices=("z", "y", "v"))
     force: float = quantity(
-        4.0, "N", "at which a press is held", low=0.5, high=10.0, grid=(2.0, 5.0)
+        3.0, "N", "at which a press is held", low=0.5, high=10.0, grid=(3.0, 6.0)
     )
     places: float = quantity(
         2, "1", "along the first stage", low=1, high=6, grid=(1, 3)
@@ -126,7 +126,7 @@ class RepeatedPresses(Experiment):
     rest: float = quantity(
         10.0, "s", "between them", low=1.0, high=120.0, grid=(10.0, 40.0)
     )
-    force: float = quantity(4.0, "N", "at which a press is held", low=0.5, high=10.0)
+    force: float = quantity(3.0, "N", "at which a press is held", low=0.5, high=10.0)
 
     def phases(self, scenario: Scenario) -> Iterator[Phase]:
         """See Experiment."""

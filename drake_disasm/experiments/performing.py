@@ -6,11 +6,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
+from drake_disasm.effects import PoseEffect, pose_weights
 from drake_disasm.experiments.base import Plan
 from drake_disasm.experiments.performer import Performer
 from drake_disasm.mdp import BoltState, Outcome, TaskGeometry
+from drake_disasm.safety import SafetyConfig
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations import Station
+from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.task.episode import Recorder
 from drake_disasm.task.simulation import StationFactory, StepResult, TaskSimulation
 from drake_disasm.twin.batch import BatchedTwin
@@ -66,6 +69,12 @@ class Laboratory:
         """On which they are performed."""
         return self.simulation.station
 
+    @property
+    def limits(self) -> SafetyConfig | None:
+        """At which the station holds; None for a simulated one."""
+        station = self.station
+        return station.config.safety if isinstance(station, HardwareStation) else None
+
     def perform(
         self,
         plan: Plan,
@@ -87,7 +96,11 @@ class Laboratory:
         if recorder:
             recorder.measure()
         while True:
-            result = simulation.step()
+            try:
+                result = simulation.step()
+            except HoldError as error:
+                ended = str(error)
+                break
             found.append(result.observation)
             actions.append(simulation.action())
             ended = _ended(result, simulation.systems.monitor.geometry)
@@ -98,7 +111,8 @@ class Laboratory:
             progress(ProgressUpdate(update, len(found) - 1, plan.most_steps))
             if is_over:
                 break
-        return Performance(np.array(found), np.array(actions), ended, plan.period)
+        performed = np.array(actions).reshape(-1, 6)
+        return Performance(np.array(found), performed, ended, plan.period)
 
 
 def perform_side_by_side(
@@ -134,10 +148,11 @@ def _batch(
     scenarios: Sequence[Scenario], plans: Sequence[Plan], progress: Progress
 ) -> list[list[Performance]]:
     rows = [scenario for scenario in scenarios for _ in plans]
-    twin = BatchedTwin(rows, device="numpy")
+    twin = BatchedTwin([_without_pose_effects(row) for row in rows], device="numpy")
+    report = _ReportedPoses(rows)
     geometry = TaskGeometry.of(scenarios[0], np.zeros((6, 6)))
     performers = [Performer(plan) for _ in scenarios for plan in plans]
-    states = [twin.reset([0] * len(rows)).copy()]
+    states = [report(twin.reset([0] * len(rows)).copy())]
     actions: list[np.ndarray] = []
     ended, steps = [""] * len(rows), np.zeros(len(rows), int)
     running = np.ones(len(rows), bool)
@@ -147,7 +162,7 @@ def _batch(
         pairs = zip(performers, states[-1], strict=True)
         result = twin.step(np.array([act(state) for act, state in pairs]))
         actions.append(twin.action.copy())
-        states.append(result.observation.copy())
+        states.append(report(result.observation.copy()))
         steps += running
         for i in np.flatnonzero(running).tolist():
             outcome = Outcome(int(result.outcome[i]))
@@ -160,6 +175,34 @@ def _batch(
         for i, n in enumerate(steps.tolist())
     )
     return [[next(found) for _ in plans] for _ in scenarios]
+
+
+def _without_pose_effects(scenario: Scenario) -> Scenario:
+    kept = [each for each in scenario.effects if not isinstance(each, PoseEffect)]
+    return dataclasses.replace(scenario, effects=kept)
+
+
+class _ReportedPoses:
+    """What rows report of their poses: a batch knows these as they are.
+
+    Args:
+        rows: scenarios, with their effects on the measured pose.
+    """
+
+    def __init__(self, rows: Sequence[Scenario]) -> None:
+        each = [pose_weights(row.effects, row.task.period) for row in rows]
+        self._weights = np.zeros((max(map(len, each)), len(rows), 1))
+        for number, weights in enumerate(each):
+            self._weights[: len(weights), number, 0] = weights
+        self._newest_first: list[Array] = []
+
+    def __call__(self, states: Array) -> Array:
+        """Returns states (rows, 12) with the poses that are reported."""
+        past, count = self._newest_first, len(self._weights)
+        past.insert(0, states[:, :6])
+        del past[count:]
+        ago = [past[min(k, len(past) - 1)] for k in range(count)]
+        return np.hstack([np.sum(self._weights * np.array(ago), axis=0), states[:, 6:]])
 
 
 def _ended(result: StepResult, geometry: TaskGeometry) -> str:

@@ -16,7 +16,7 @@ what lies between two experiments.
 import dataclasses
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -33,6 +33,7 @@ from drake_disasm.experiments.performing import (
     Performance,
     perform_side_by_side,
 )
+from drake_disasm.safety import SafetyConfig
 from drake_disasm.scenario import Scenario
 from drake_disasm.twin.steps import noise_free
 from sysid.diagnosis.rivals import BY_CHANCE, Need, Rival
@@ -99,6 +100,8 @@ def predict(
     rivals: Sequence[Rival],
     need: Need,
     progress: Progress,
+    limits: SafetyConfig | None = None,
+    trust: Mapping[str, float] | None = None,
 ) -> list[Prediction]:
     """Returns what rivals predict of experiments, the best first.
 
@@ -110,12 +113,17 @@ def predict(
         rivals: at least two.
         need: how far apart they have to be.
         progress: gets each simulation.
+        limits: at which the station holds, if it does.
+        trust: in the distances of a class of experiments, by its name; 1 if left out.
     """
+    trust = trust or {}
     known = [dataclasses.replace(rival, varied=()) for rival in rivals]
-    order = [each.plan for each in _predictions(plans, known, need, progress)]
-    found = _predictions(order[:_LOOKED_AT], rivals, need, progress)
+    order = [
+        each.plan for each in _predictions(plans, known, need, progress, limits, trust)
+    ]
+    found = _predictions(order[:_LOOKED_AT], rivals, need, progress, limits, trust)
     if order[_LOOKED_AT:] and not is_enough(found, rivals, need, math.inf):
-        found += _predictions(order[_LOOKED_AT:], rivals, need, progress)
+        found += _predictions(order[_LOOKED_AT:], rivals, need, progress, limits, trust)
     return sorted(found, key=lambda each: -each.value)
 
 
@@ -124,6 +132,8 @@ def _predictions(
     rivals: Sequence[Rival],
     need: Need,
     progress: Progress,
+    limits: SafetyConfig | None,
+    trust: Mapping[str, float],
 ) -> list[Prediction]:
     """Returns what rivals predict of experiments, the best first; see `predict`."""
     led = _performed(plans, [rival.scenario for rival in rivals], progress)
@@ -143,8 +153,9 @@ def _predictions(
         done = tuple(own[number] for own in led)
         same = [[twin[number] for twin in own] for own in replayed]
         duration = max(each.duration for each in done)
-        distances = _distances(same, sigma)
-        hazard = _hazard(done, rivals, reach)
+        name = type(plan.experiment).__name__
+        distances = trust.get(name, 1.0) * _distances(same, sigma)
+        hazard = _hazard(done, rivals, reach, limits)
         needed = need.distances(rivals, round(duration / plan.period))
         gain = 0.0 if hazard else _gain(distances / needed, weights)
         value = gain / (duration + _BETWEEN)
@@ -279,22 +290,42 @@ def _gain(distances: Array, weights: Array) -> float:
 
 
 def _hazard(
-    done: Sequence[Performance], rivals: Sequence[Rival], reach: "_Reach"
+    done: Sequence[Performance],
+    rivals: Sequence[Rival],
+    reach: "_Reach",
+    limits: SafetyConfig | None,
 ) -> str:
     """Returns why an experiment is not safe under every rival; empty if it is."""
     reward = rivals[0].scenario.task.reward
+    most_force, most_torque = _MARGIN * reward.f_max, _MARGIN * reward.t_max
+    if limits:
+        most_force = min(most_force, _MARGIN * limits.max_force)
+        most_torque = min(most_torque, _MARGIN * limits.max_torque_xy)
     for each, rival in zip(done, rivals, strict=True):
         force, torque = each.greatest
         if each.ended:
             return f"under {rival.name} it ends by {each.ended}"
-        if force > _MARGIN * reward.f_max or torque > _MARGIN * reward.t_max:
+        if force > most_force or torque > most_torque:
             return (
                 f"under {rival.name} it presses by {force:.1f} N and {torque:.2f} N m, "
-                f"above {100 * _MARGIN:.0f} % of what the task allows"
+                f"above {100 * _MARGIN:.0f} % of what is allowed"
+            )
+        if limits and not _is_within(limits, each.observations[:, :3]):
+            return (
+                f"under {rival.name} it comes near the sides of the workspace; see "
+                "safety.workspace_*"
             )
         if beyond := reach.beyond(each.observations):
             return f"under {rival.name} {beyond}"
     return ""
+
+
+def _is_within(limits: SafetyConfig, path: Array) -> bool:
+    """Returns whether a path (n, 3) keeps off the workspace's sides, twice as far."""
+    margin = 2.0 * limits.workspace_margin
+    low = np.array(limits.workspace_low) + margin
+    high = np.array(limits.workspace_high) - margin
+    return bool(np.all((low <= path) & (path <= high)))
 
 
 def as_batch(scenario: Scenario) -> Scenario:

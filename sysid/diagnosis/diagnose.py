@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from sysid.diagnosis.rivals import NOTHING, Need, Rival, rivals_of
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.workers import Workers
 
+_TRUST = 0.5  # in what another experiment of the same class would separate
 _FIRST = 3  # removals before the first verdict
 
 #: Is asked before each experiment, with what it is; False ends the diagnosis.
@@ -288,16 +290,23 @@ class _Session:
                 raise DisasmError("stopped by hand before the first verdict")
             self.first_time += self.log.perform(plan).duration
             self._write("")
+            self.log.refuse_hold()
 
     def predict(
         self, plans: Sequence[Plan], rivals: Sequence[Rival], need: Need
     ) -> list[Prediction]:
-        """Returns what rivals predict of experiments that were not performed yet."""
+        """Returns what rivals predict of experiments that were not performed yet.
+
+        Of a class that was performed, and after which the question is still open,
+        predictions count half as much each time.
+        """
         if len(rivals) < 2:
             return []
         done = {each.experiment for each in self.rounds}
         left = [plan for plan in plans if plan.text not in done]
-        return predict(left, rivals, need, self._progress)
+        classes = Counter(text.partition("(")[0] for text in done)
+        trust = {name: _TRUST**count for name, count in classes.items()}
+        return predict(left, rivals, need, self._progress, self.log.limits, trust)
 
     def experiment(
         self, closed: ClosedLoop, rivals: Sequence[Rival], chosen: Prediction
@@ -321,6 +330,7 @@ class _Session:
             )
         )
         self._write("")
+        self.log.refuse_hold()
 
     def close(self, closed: ClosedLoop, rivals: Sequence[Rival], reason: str) -> None:
         """Notes the last verdict, which has no experiment, and why it is the last."""

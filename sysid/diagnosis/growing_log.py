@@ -10,6 +10,7 @@ from drake_disasm.experiments import Plan
 from drake_disasm.experiments.performing import Laboratory, Performance
 from drake_disasm.logs import LogWriter, read_log
 from drake_disasm.logs.columns import flat_columns
+from drake_disasm.safety import SafetyConfig
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 from drake_disasm.task.simulation import StationFactory
@@ -48,6 +49,15 @@ class GrowingLog:
     def episodes(self) -> int:
         """How many there are."""
         return self._writer.next_number
+
+    @property
+    def limits(self) -> SafetyConfig | None:
+        """At which the station holds; None for a simulated one."""
+        return self._laboratory.limits
+
+    def refuse_hold(self) -> None:
+        """Raises HoldError while the station holds."""
+        self._laboratory.station.check()
 
     def perform(self, plan: Plan) -> Performance:
         """Performs an experiment; what was recorded is kept if the station holds."""

@@ -161,7 +161,7 @@ def uncertainty_of(information: Array) -> float:
     return float(-np.linalg.slogdet(information + ridge)[1] / size)
 
 
-def confusion_of(information: Array, kinds: Sequence[Array]) -> float:
+def confusion_of(information: Array, kinds: Sequence[NDArray[np.bool_]]) -> float:
     """Returns how badly some effects are told from each other: least is best.
 
     -log det of what each effect's amplitudes do that neither base parameters nor the
