@@ -1,16 +1,18 @@
 """Which experiment separates rivals best, and whether it is safe under each of them.
 
 Each experiment is performed on the twin under each rival, for its safety. What rivals
-predict is compared under the same actions, those of the first, as a log's model is, and
-once more for each parameter that the log leaves uncertain. Two rivals are as far apart
-as what a station would measure differs, d, in standard deviations of the sensor's
-noise, of the model's own error and of what their parameters may still be (Box and Hill,
-"Discrimination among mechanistic models", 1967). A verdict tells them apart once one
-leaves enough more of the loss, d0^2. So whoever chooses between them errs with a
-probability of at most sqrt(w1 w2) exp(-2 (d / d0)^2), which with d0 = 4 is the bound of
-Kailath ("The divergence and Bhattacharyya distance measures in signal selection",
-1967). The best experiment takes most of that away per second of robot time, with
-what lies between two experiments.
+predict is compared under the same actions, those of the first, as a log's model is.
+
+Two rivals are as far apart as what a station would measure differs, d, in standard
+deviations of the sensor's noise and of the model's own error, whichever of them is
+true, and with the other fitted to that as far as the log lets its parameters go
+(T-optimality: Atkinson and Fedorov, "The design of experiments for discriminating
+between two rival models", 1975). A verdict tells them apart once one leaves enough more
+of the loss, d0^2. So whoever chooses between them errs with a probability of at most
+sqrt(w1 w2) exp(-2 (d / d0)^2), which with d0 = 4 is the bound of Kailath ("The
+divergence and Bhattacharyya distance measures in signal selection", 1967). The best
+experiment takes most of that away per second of robot time, with what lies between two
+experiments. That none helps is said only if none would with all parameters known.
 """
 
 import dataclasses
@@ -57,6 +59,7 @@ class Prediction:
         performances: of each rival, on the twin.
         replayed: of each rival, with the actions of the first rival's.
         distances: (k, k) between rivals, in standard deviations.
+        bounds: (k, k) the same if their parameters were known.
         needed: (k, k) at which a verdict would tell them apart.
         sigma: (12,) by which a measured state may differ anyway.
         hazard: why it is not performed, in words; empty if it may be.
@@ -67,6 +70,7 @@ class Prediction:
     performances: tuple[Performance, ...]
     replayed: tuple[Performance, ...]
     distances: Array
+    bounds: Array
     needed: Array
     sigma: Array
     hazard: str
@@ -86,8 +90,8 @@ class Prediction:
 
     @property
     def is_helpful(self) -> bool:
-        """Whether it is safe, and would show two rivals to differ."""
-        return not self.hazard and self.farthest >= BY_CHANCE
+        """Whether it is safe, and may show two rivals to differ."""
+        return not self.hazard and float(self.bounds.max(initial=0.0)) >= BY_CHANCE
 
     @property
     def farthest(self) -> float:
@@ -154,14 +158,17 @@ def _predictions(
         same = [[twin[number] for twin in own] for own in replayed]
         duration = max(each.duration for each in done)
         name = type(plan.experiment).__name__
-        distances = trust.get(name, 1.0) * _distances(same, sigma)
+        distances = trust.get(name, 1.0) * _distances(same, sigma, weights)
+        bounds = _distances([own[:1] for own in same], sigma, weights)
         hazard = _hazard(done, rivals, reach, limits)
         needed = need.distances(rivals, round(duration / plan.period))
         gain = 0.0 if hazard else _gain(distances / needed, weights)
         value = gain / (duration + _BETWEEN)
         shown = tuple(own[0] for own in same)
         found.append(
-            Prediction(plan, done, shown, distances, needed, sigma, hazard, value)
+            Prediction(
+                plan, done, shown, distances, bounds, needed, sigma, hazard, value
+            )
         )
     return sorted(found, key=lambda each: -each.value)
 
@@ -172,7 +179,7 @@ def is_enough(
     need: Need,
     left: float,
 ) -> bool:
-    """Returns whether experiments one after the other tell two rivals apart.
+    """Returns whether experiments one after the other may tell two rivals apart.
 
     Args:
         predictions: of experiments, the best first.
@@ -184,7 +191,7 @@ def is_enough(
     for each in predictions:
         if each.is_helpful and each.duration <= left:
             left -= each.duration
-            squares += each.distances**2
+            squares += each.bounds**2
             rows += round(each.duration / each.plan.period)
             if (squares >= need.distances(rivals, rows) ** 2).any():
                 return True
@@ -233,15 +240,19 @@ def _sigma(scenario: Scenario) -> Array:
     return np.repeat([m, rad, force, torque], 3)
 
 
-def _distances(of_rivals: Sequence[Sequence[Performance]], sigma: Array) -> Array:
+def _distances(
+    of_rivals: Sequence[Sequence[Performance]], sigma: Array, weights: Array
+) -> Array:
     """Returns how far rivals are apart (k, k), over the steps that all have.
 
-    With the covariance 1 + J J^T of what is measured, in units of sigma: J is how it
-    changes with each rival's parameters, by a standard deviation of each.
+    One of two is true; the other is fitted to what comes out, with the covariance
+    1 + J J^T in units of sigma: J is how it changes with its parameters, by a standard
+    deviation of each. The mean square over which is true, by their weights.
 
     Args:
         of_rivals: of each its own performance, and one for each parameter.
         sigma: (12,) of a state.
+        weights: (k,).
     """
     steps = min(len(each.observations) for own in of_rivals for each in own)
     whitened = [
@@ -251,8 +262,11 @@ def _distances(of_rivals: Sequence[Sequence[Performance]], sigma: Array) -> Arra
     found = np.zeros((len(whitened), len(whitened)))
     for i, j in itertools.combinations(range(len(whitened)), 2):
         (one, *more), (other, *others) = whitened[i], whitened[j]
-        columns = [x - one for x in more] + [x - other for x in others]
-        found[i, j] = found[j, i] = mahalanobis(one - other, np.array(columns))
+        away, both = one - other, weights[i] + weights[j]
+        if_one = mahalanobis(away, np.array([x - other for x in others]))
+        if_other = mahalanobis(away, np.array([x - one for x in more]))
+        squared = weights[i] * if_one**2 + weights[j] * if_other**2
+        found[i, j] = found[j, i] = np.sqrt(squared / both)
     return found
 
 

@@ -31,7 +31,6 @@ _LEAST = 1e-4  # weight of a hypothesis that the log speaks against
 _DRAWS = 2000  # of folds: a weight of a half is then known to a hundredth
 _OF_BOUND = 0.5  # of an amplitude that no size within its bounds would have shown
 _TIMES = 2.0  # the size that would have been found
-_NORMAL = 1.96  # standard deviations of a 95 % interval
 _MOST = 6  # hypotheses about what a log could not have shown
 
 
@@ -45,8 +44,8 @@ class Rival:
         weight: share of draws of the log's folds in which it predicts held-out rows
             best; of those that the verdict can't tell apart the mean of that and of the
             same for each; of what the log could not have shown, the same for each.
-        varied: the scenario with one parameter of its effects changed by a standard
-            deviation, one after the other.
+        varied: the scenario, moved by a standard deviation along each axis of the
+            covariance of its effects' parameters.
         loss: that it leaves of rows of the log that it was not fitted to.
     """
 
@@ -130,14 +129,14 @@ def rivals_of(
 
 
 def _varied(fit: Fit) -> Iterator[Scenario]:
-    """Yields a fit's scenario with one parameter of its effects changed."""
+    """Yields a fit's scenario, moved along each axis of its parameters' covariance."""
     scaling, u = Scaling(fit.model.parameters), fit.linearisation.u
-    sigma = fit.half_intervals / _NORMAL
-    for i in range(len(u)):
-        moved = u.copy()
-        moved[i] += sigma[i] if u[i] + sigma[i] <= 1.0 else -sigma[i]
+    covariance = np.nan_to_num(fit.covariance) if len(u) else np.zeros((0, 0))
+    variances, axes = np.linalg.eigh(covariance)
+    for variance, axis in zip(variances.tolist(), axes.T, strict=True):
+        moved = u + axis * math.sqrt(max(variance, 0.0))
         scenario = fit.model.scenario_at(scaling.from_unit(np.clip(moved, 0.0, 1.0)))
-        if scenario is not None and np.isfinite(sigma[i]):
+        if scenario is not None:
             yield scenario
 
 
