@@ -229,10 +229,11 @@ def _inseparable(rivals: Sequence[Rival], predictions: Sequence[Prediction]) -> 
         first = next((p.hazard for p in predictions), "there is no experiment")
         return f"no experiment is safe: {first}"
     most = max(safe, key=lambda p: float(p.bounds.max(initial=0.0)))
+    largest = most.bounds.argmax()
     return (
         f"no experiment separates {names}: the largest difference that any predicts is "
-        f"{most.bounds.max(initial=0.0):.1f} standard deviations, of {most.plan.text}, and the "
-        f"verdict needs {most.needed.flat[most.bounds.argmax()]:.1f}"
+        f"{most.bounds.flat[largest]:.1f} standard deviations, of {most.plan.text}, "
+        f"and the verdict needs {most.needed.flat[largest]:.1f}"
     )
 
 
