@@ -91,6 +91,8 @@ class FakeCell:
 
     def jog_to_start(self) -> None:
         """Puts the arm back to where an episode starts, the bolt gripped at A."""
+        while self._lcm.HandleSubscriptions(0):
+            pass  # commands that were on their way
         start, self._steps = self._start
         self._context.SetTimeStateAndParametersFrom(start)
         self.simulator.Initialize()

@@ -1,0 +1,64 @@
+"""A diagnosis over the devices' own protocols, in virtual time; holds."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from drake_disasm.effects import SensorDrift, SensorMounting, SensorWarmUp
+from drake_disasm.experiments import Presses, Rest
+from drake_disasm.logs import read_log
+from drake_disasm.scenario import load_scenario
+from drake_disasm.stations.fake_cell.lockstep import FakeHardware, fake_hardware
+from sysid.diagnosis import Budget, Diagnosis, diagnose
+from tests.refusals import refused
+
+MODEL = load_scenario("removal", ["contact.model=impact"])
+EFFECTS = (SensorDrift, SensorWarmUp, SensorMounting)
+
+
+def _back_at_a(fake: FakeHardware) -> Callable[[str], bool]:
+    """Returns what a person does before each experiment: brings the bolt back to A."""
+
+    def confirm(_: str) -> bool:
+        fake.jog_to_start()
+        return True
+
+    return confirm
+
+
+def _diagnose(fake: FakeHardware, folder: Path, **more: object) -> Diagnosis:
+    return diagnose(
+        MODEL,
+        folder,
+        station=lambda _: fake.station,
+        real=fake.station.scenario,
+        experiments=(Presses, Rest),
+        effects=EFFECTS,
+        confirm=_back_at_a(fake),
+        **more,
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "effect", [SensorMounting(ry=0.15), SensorWarmUp(fz=3.0, time_constant=12.0), None]
+)
+def test_it_ends_with_what_the_cell_hides(effect, tmp_path) -> None:
+    hidden = [effect] if effect else []
+    with fake_hardware("removal", hidden=hidden) as fake:
+        found = _diagnose(fake, tmp_path)
+    assert found.names == tuple(type(each).__name__ for each in hidden)
+    assert not found.closed.verdict.ambiguous
+
+
+def test_a_hold_keeps_the_rows_and_the_next_start_goes_on(tmp_path) -> None:
+    with fake_hardware("removal", limits={"max_force": 1.5}) as fake:
+        with refused("is held", "force"):
+            _diagnose(fake, tmp_path)
+    [episode] = read_log(tmp_path / "log").episodes
+    assert len(episode.columns["time"]) > 3
+    with fake_hardware("removal") as fake:
+        with refused("before the first verdict"):
+            _diagnose(fake, tmp_path, budget=Budget(10.0))
+    assert len(read_log(tmp_path / "log").episodes) == 2
