@@ -107,10 +107,9 @@ def rivals_of(
     """
     verdict = closed.verdict
     if not (verdict.ambiguous or verdict.suggested):
-        return _unseen(closed, log)
+        return _unseen(closed, log, workers, folder)
     model = log.model()
-    delta = model.default_huber_delta
-    fitter = Fitter.of(model, workers, delta, closed.last.settings, folder)
+    fitter = _fitter(closed, model, workers, folder)
     sets = list(_sets(closed, candidates(model)))
     fits = [fitter.fit(effects, _start(closed.last, effects)) for effects, _ in sets]
     shares = best_of_folds([fit.held_out_losses for fit in fits])
@@ -186,24 +185,43 @@ def _shaped(closed: ClosedLoop, name: str, library: Sequence[Candidate]) -> Cand
     return next(each for each in library if each.name == name)
 
 
-def _unseen(closed: ClosedLoop, log: GrowingLog) -> tuple[Rival, ...]:
+def _fitter(
+    closed: ClosedLoop, model: LogModel, workers: Workers, folder: Path | None
+) -> Fitter:
+    delta = model.default_huber_delta
+    return Fitter.of(model, workers, delta, closed.last.settings, folder)
+
+
+def _unseen(
+    closed: ClosedLoop, log: GrowingLog, workers: Workers, folder: Path | None
+) -> tuple[Rival, ...]:
     """Returns the verdict, and what its log does not speak against, each as a rival.
 
-    Where something is named, that is all that was asked.
+    An effect that its fit leaves at no size is one of a size that matters, unless the
+    log speaks against that. Where something is named, that is all that was asked.
     """
     scenario = closed.scenario
     if scenario is None:
         return ()
     if closed.verdict.confirmed:
         return (Rival(" and ".join(closed.verdict.confirmed), scenario, 1.0),)
-    found = [Rival(NOTHING, scenario, 1.0, loss=_loss(log.model(scenario)))]
+    model = log.model(scenario)
+    fitter, library = _fitter(closed, model, workers, folder), candidates(model)
+    alone, without = fitter.fit(()).loss, _loss(model)
+    found = [Rival(NOTHING, scenario, 1.0, loss=alone)]
     for kind in sorted(closed.verdict.undetectable)[:_MOST]:
         effect = _of_size(kind, closed.verdict.limits)
-        if effect is not None:
-            more = dataclasses.replace(scenario, effects=[*scenario.effects, effect])
-            loss = _loss(log.model(more))
-            if loss - found[0].loss < BY_CHANCE**2:
-                found.append(Rival(kind, more, 1.0, loss=loss))
+        if effect is None:
+            continue
+        more = dataclasses.replace(scenario, effects=[*scenario.effects, effect])
+        loss = alone + _loss(log.model(more)) - without
+        rival = Rival(kind, more, 1.0, loss=loss)
+        fit = fitter.fit(tuple(each for each in library if each.name == kind)[:1])
+        fitted = fit.model.scenario_at(fit.theta)
+        if fitted is not None and alone - fit.loss >= BY_CHANCE**2:
+            rival = Rival(kind, fitted, 1.0, tuple(_varied(fit)), fit.loss)
+        if rival.loss - alone < BY_CHANCE**2:
+            found.append(rival)
     return tuple(dataclasses.replace(each, weight=1.0 / len(found)) for each in found)
 
 

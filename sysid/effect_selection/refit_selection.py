@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
+from drake_disasm.effects import EnvironmentEffect
 from sysid.effect_selection.exceeds_noise import exceeds_noise_p
 from sysid.effect_selection.forward_selection import Gain, Step, Term, ranked, step_of
 from sysid.effect_selection.linear_account import LinearAccount
@@ -147,12 +148,25 @@ class RefitSelection:
         return list(best.values())
 
     def _trials(self, fit: Fit, best: Sequence[Gain]) -> list[Gain]:
-        """Returns what is fitted of effects in their best shapes, the best first."""
+        """Returns what is fitted of effects in their best shapes, the best first.
+
+        At null, where a bolt does not touch, a derivative by what is around it says
+        little: of these all are fitted, once, if that takes seconds.
+        """
         limits = self._settings
         if fit.noise_is_stated and fit.objective > limits.max_linear_objective:
             return self._prescreened(fit, best)
         least = 0.5 * limits.min_gain
-        return [gain for gain in best if gain.share >= least][: limits.trials]
+        found = [gain for gain in best if gain.share >= least][: limits.trials]
+        if fit.effects or self.fitter.base.costly:
+            return found
+        known = {gain.term.names for gain in found}
+        return found + [
+            gain
+            for gain in best
+            if isinstance(gain.term.candidates[0].effect, EnvironmentEffect)
+            and gain.term.names not in known
+        ]
 
     def _prescreened(self, fit: Fit, gains: Sequence[Gain]) -> list[Gain]:
         """Returns the effects that explain most by fits to a few rows, the best first.

@@ -53,12 +53,14 @@ def test_it_ends_with_what_the_cell_hides(effect, tmp_path) -> None:
 
 
 def test_a_hold_keeps_the_rows_and_the_next_start_goes_on(tmp_path) -> None:
-    with fake_hardware("removal", limits={"max_force": 1.5}) as fake:
-        with refused("is held", "force"):
-            _diagnose(fake, tmp_path)
+    weak = {"max_force": 1.5}
+    with (
+        fake_hardware("removal", limits=weak) as fake,
+        refused("is held", "force"),
+    ):
+        _diagnose(fake, tmp_path)
     [episode] = read_log(tmp_path / "log").episodes
     assert len(episode.columns["time"]) > 3
-    with fake_hardware("removal") as fake:
-        with refused("before the first verdict"):
-            _diagnose(fake, tmp_path, budget=Budget(10.0))
+    with fake_hardware("removal") as fake, refused("before the first verdict"):
+        _diagnose(fake, tmp_path, budget=Budget(10.0))
     assert len(read_log(tmp_path / "log").episodes) == 2
