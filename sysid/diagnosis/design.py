@@ -187,15 +187,12 @@ def is_enough(
         need: how far apart they have to be.
         left: robot time [s]; those are left out that it is too short for.
     """
-    squares, rows = np.zeros((len(rivals), len(rivals))), 0
+    squares, enough = np.zeros((len(rivals), len(rivals))), need.distances(rivals, 0)
     for each in predictions:
         if each.is_helpful and each.duration <= left:
             left -= each.duration
             squares += each.bounds**2
-            rows += round(each.duration / each.plan.period)
-            if (squares >= need.distances(rivals, rows) ** 2).any():
-                return True
-    return False
+    return bool((squares >= enough**2).any())
 
 
 def _performed(

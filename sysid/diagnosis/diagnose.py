@@ -152,7 +152,7 @@ def diagnose(
     plans = _plans(scenario, experiments)
     while True:
         closed = session.log.verdict(effects, workers, budget.verdict, fits)
-        rivals = rivals_of(closed, session.log, workers, fits)
+        rivals = rivals_of(closed, session.log, workers, fits, len(session.rounds))
         need = Need.of(closed)
         predictions = session.predict(plans, rivals, need)
         left = budget.robot - session.robot_time

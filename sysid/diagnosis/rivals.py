@@ -31,6 +31,8 @@ _LEAST = 1e-4  # weight of a hypothesis that the log speaks against
 _DRAWS = 2000  # of folds: a weight of a half is then known to a hundredth
 _OF_BOUND = 0.5  # of an amplitude that no size within its bounds would have shown
 _TIMES = 2.0  # the size that would have been found
+_SUSPECTS = 3  # of something that is unexplained
+_TRIED = 3  # experiments, until that is taken to be in no library
 _MOST = 6  # hypotheses about what a log could not have shown
 
 
@@ -95,7 +97,11 @@ class Need:
 
 
 def rivals_of(
-    closed: ClosedLoop, log: GrowingLog, workers: Workers, folder: Path | None = None
+    closed: ClosedLoop,
+    log: GrowingLog,
+    workers: Workers,
+    folder: Path | None = None,
+    performed: int = 0,
 ) -> tuple[Rival, ...]:
     """Returns the hypotheses that are left; one alone is settled.
 
@@ -104,16 +110,20 @@ def rivals_of(
         log: on which it is.
         workers: fit.
         folder: of a cache of fits.
+        performed: how many experiments were.
     """
-    verdict = closed.verdict
-    if not (verdict.ambiguous or verdict.suggested):
+    verdict, model = closed.verdict, log.model()
+    fitter, library = _fitter(closed, model, workers, folder), candidates(model)
+    is_open = verdict.ambiguous or verdict.suggested
+    if is_open:
+        sets = list(_sets(closed, library))
+    elif verdict.ending == "unexplained" and performed < _TRIED:
+        sets = list(_suspects(closed, library))
+    else:
         return _unseen(closed, log, workers, folder)
-    model = log.model()
-    fitter = _fitter(closed, model, workers, folder)
-    sets = list(_sets(closed, candidates(model)))
     fits = [fitter.fit(effects, _start(closed.last, effects)) for effects, _ in sets]
     shares = best_of_folds([fit.held_out_losses for fit in fits])
-    equal = 1.0 / sum(is_ambiguous for _, is_ambiguous in sets)
+    equal = 1.0 / max(1, sum(is_ambiguous for _, is_ambiguous in sets))
     found = []
     for (effects, is_ambiguous), fit, share in zip(
         sets, fits, shares.tolist(), strict=True
@@ -183,6 +193,17 @@ def _shaped(closed: ClosedLoop, name: str, library: Sequence[Candidate]) -> Cand
             if candidate.name == name:
                 return Candidate.of(candidate.effect)
     return next(each for each in library if each.name == name)
+
+
+def _suspects(
+    closed: ClosedLoop, library: Sequence[Candidate]
+) -> Iterator[tuple[tuple[Candidate, ...], bool]]:
+    """Yields what explains most of a residual that is unexplained, and nothing."""
+    yield (), False
+    names = dict.fromkeys(gain.term.names for gain in closed.search.begin)
+    single = [own[0] for own in names if len(own) == 1]
+    for name in single[:_SUSPECTS]:
+        yield (_shaped(closed, name, library),), True
 
 
 def _fitter(

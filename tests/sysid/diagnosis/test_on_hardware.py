@@ -10,24 +10,25 @@ from drake_disasm.experiments import Presses, Rest
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations.fake_cell.lockstep import FakeHardware, fake_hardware
-from sysid.diagnosis import Budget, Diagnosis, diagnose
+from sysid.diagnosis import Diagnosis, diagnose
 from tests.refusals import refused
 
 MODEL = load_scenario("removal", ["contact.model=impact"])
 EFFECTS = (SensorDrift, SensorWarmUp, SensorMounting)
 
 
-def _back_at_a(fake: FakeHardware) -> Callable[[str], bool]:
+def _back_at_a(fake: FakeHardware, most: int) -> Callable[[str], bool]:
     """Returns what a person does before each experiment: brings the bolt back to A."""
+    left = iter([True] * most)
 
     def confirm(_: str) -> bool:
         fake.jog_to_start()
-        return True
+        return next(left, False)
 
     return confirm
 
 
-def _diagnose(fake: FakeHardware, folder: Path, **more: object) -> Diagnosis:
+def _diagnose(fake: FakeHardware, folder: Path, most: int = 20) -> Diagnosis:
     return diagnose(
         MODEL,
         folder,
@@ -35,8 +36,7 @@ def _diagnose(fake: FakeHardware, folder: Path, **more: object) -> Diagnosis:
         real=fake.station.scenario,
         experiments=(Presses, Rest),
         effects=EFFECTS,
-        confirm=_back_at_a(fake),
-        **more,
+        confirm=_back_at_a(fake, most),
     )
 
 
@@ -59,8 +59,9 @@ def test_a_hold_keeps_the_rows_and_the_next_start_goes_on(tmp_path) -> None:
         refused("is held", "force"),
     ):
         _diagnose(fake, tmp_path)
-    [episode] = read_log(tmp_path / "log").episodes
-    assert len(episode.columns["time"]) > 3
-    with fake_hardware("removal") as fake, refused("before the first verdict"):
-        _diagnose(fake, tmp_path, budget=Budget(10.0))
-    assert len(read_log(tmp_path / "log").episodes) == 2
+    held = read_log(tmp_path / "log").episodes
+    assert len(held) < 3 and len(held[-1].columns["time"]) > 3
+    with fake_hardware("removal") as fake, refused("stopped by hand"):
+        _diagnose(fake, tmp_path, most=1)
+    episodes = read_log(tmp_path / "log").episodes
+    assert len(episodes) == len(held) + 1
