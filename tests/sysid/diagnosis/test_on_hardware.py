@@ -53,7 +53,7 @@ def test_it_ends_with_what_the_cell_hides(effect, tmp_path) -> None:
 
 
 def test_a_hold_keeps_the_rows_and_the_next_start_goes_on(tmp_path) -> None:
-    weak = {"max_force": 1.5}
+    weak = {"max_force": 1.0}
     with (
         fake_hardware("removal", limits=weak) as fake,
         refused("is held", "force"),
