@@ -19,7 +19,7 @@ PRINTED = {
     "own_policy": ["twin        12", "cell        12"],
     "own_environment": [r"last  eight episodes: mean reward  -0\."],
     "own_agent": ["4      120", "8      239"],
-    "own_experiment": [r"Staircase\(top=6.0, stairs=3\)", r"\n +0\.\d+ +-[56]\.\d\d"],
+    "own_experiment": [r"Staircase\(top=6.0, stairs=3\)", r"11\.\d\d +-[56]\.\d\d"],
     "own_effect": [
         "MagneticCatch  confirmed  force = ",
         r"MagneticCatch\(force=3\.9",
