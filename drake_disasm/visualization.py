@@ -69,7 +69,7 @@ class MeshcatView:
     def __init__(
         self, meshcat: Meshcat, record: bool = False, close_up: bool = False
     ) -> None:
-        self.meshcat, self._record, self._close_up = meshcat, record, close_up
+        self.meshcat, self.records, self._close_up = meshcat, record, close_up
 
     def connect(self, builder: DiagramBuilder, systems: TaskSystems) -> None:
         """Adds Drake's visualisers and the wrench's."""
@@ -108,13 +108,13 @@ class MeshcatView:
     def begin_episode(self) -> None:
         """Clears the path; starts recording if asked to."""
         self.wrench.clear()
-        if self._record:
+        if self.records:
             self.meshcat.DeleteRecording()
             self.meshcat.StartRecording(frames_per_second=1.0 / _FRAME_PERIOD)
 
     def end_episode(self) -> None:
         """Publishes the recording, so that the page has a time slider."""
-        if self._record:
+        if self.records:
             self.meshcat.StopRecording()
             self.meshcat.PublishRecording()
 

@@ -15,7 +15,12 @@ from drake_disasm.scenario import Scenario
 from drake_disasm.stations import Station
 from drake_disasm.stations.hardware import HardwareStation, HoldError
 from drake_disasm.task.episode import Recorder
-from drake_disasm.task.simulation import StationFactory, StepResult, TaskSimulation
+from drake_disasm.task.simulation import (
+    Observer,
+    StationFactory,
+    StepResult,
+    TaskSimulation,
+)
 from drake_disasm.twin.batch import BatchedTwin
 
 #: A state (12,), or several.
@@ -58,11 +63,17 @@ class Laboratory:
     Args:
         scenario: of the station.
         station: see TaskSimulation.
+        observers: see TaskSimulation: a `MeshcatView`, say.
     """
 
-    def __init__(self, scenario: Scenario, station: str | StationFactory) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        station: str | StationFactory,
+        observers: Sequence[Observer] = (),
+    ) -> None:
         self._performer = Performer()
-        self.simulation = TaskSimulation(scenario, station, self._performer)
+        self.simulation = TaskSimulation(scenario, station, self._performer, observers)
 
     @property
     def station(self) -> Station:

@@ -15,6 +15,7 @@ from drake_disasm.experiments import Experiment, Plan, Removal, registered_exper
 from drake_disasm.mdp import STATE_NAMES
 from drake_disasm.scenario import Scenario, scenario_to_mapping
 from drake_disasm.task.simulation import StationFactory
+from drake_disasm.visualization import MeshcatView
 from sysid.diagnosis.design import Prediction, is_enough, predict
 from sysid.diagnosis.growing_log import GrowingLog
 from sysid.diagnosis.rivals import NOTHING, Need, Rival, rivals_of
@@ -50,6 +51,7 @@ class Round:
         names: effects that it names.
         rivals: weights of the hypotheses, by name.
         experiment: that was performed then, with its parameters; empty for none.
+        episode: its number in the log.
         distance: by which it was to separate the two rivals that it separates best, in
             standard deviations.
         force, torque: greatest in it [N, N m].
@@ -64,6 +66,7 @@ class Round:
     names: tuple[str, ...]
     rivals: dict[str, float]
     experiment: str = ""
+    episode: int = -1
     distance: float = 0.0
     force: float = 0.0
     torque: float = 0.0
@@ -120,6 +123,7 @@ def diagnose(
     experiments: Sequence[type[Experiment]] | None = None,
     effects: Sequence[type[Effect]] | None = None,
     confirm: Confirm = lambda _: True,
+    view: MeshcatView | None = None,
     workers: Workers | None = None,
     progress: Progress = ignore_progress,
 ) -> Diagnosis:
@@ -139,6 +143,7 @@ def diagnose(
         experiments: to choose from; all registered ones if left out.
         effects: that may be named; all registered ones if left out.
         confirm: is asked before each experiment.
+        view: shows the station, see GrowingLog.
         workers: fit.
         progress: gets each step.
 
@@ -147,7 +152,7 @@ def diagnose(
             another scenario's, or what close_loop and the station raise.
     """
     workers, fits = workers or Workers(), folder / "fits"
-    session = _Session(scenario, folder, station, real or scenario, progress)
+    session = _Session(scenario, folder, station, real or scenario, view, progress)
     session.record_first(budget, confirm)
     plans = _plans(scenario, experiments)
     while True:
@@ -261,6 +266,7 @@ class _Session:
         folder: Path,
         station: str | StationFactory,
         real: Scenario,
+        view: MeshcatView | None,
         progress: Progress,
     ) -> None:
         self._scenario, self._folder = scenario, folder
@@ -270,7 +276,7 @@ class _Session:
         self.rounds: list[Round] = []
         self.first_time = 0.0
         self._read()
-        self.log = GrowingLog(scenario, folder / "log", station, real, progress)
+        self.log = GrowingLog(scenario, folder / "log", station, real, progress, view)
 
     @property
     def robot_time(self) -> float:
@@ -313,6 +319,7 @@ class _Session:
         self, closed: ClosedLoop, rivals: Sequence[Rival], chosen: Prediction
     ) -> None:
         """Performs an experiment and adds it to the log."""
+        number = self.log.episodes
         found = self.log.perform(chosen.plan)
         (force, torque), i = found.greatest, chosen.channel
         pairs = zip(rivals, chosen.replayed, strict=True)
@@ -320,6 +327,7 @@ class _Session:
             dataclasses.replace(
                 _round(closed, rivals),
                 experiment=chosen.plan.text,
+                episode=number,
                 distance=chosen.farthest,
                 force=force,
                 torque=torque,

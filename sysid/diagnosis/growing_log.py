@@ -14,6 +14,7 @@ from drake_disasm.safety import SafetyConfig
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 from drake_disasm.task.simulation import StationFactory
+from drake_disasm.visualization import MeshcatView
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.models.base import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
@@ -29,6 +30,8 @@ class GrowingLog:
         station: "cell", "twin", or what makes the hardware's.
         real: scenario of a simulated station; the stated one if left out.
         progress: gets each step.
+        view: shows each experiment; if it records, a page of each is kept in the
+            folder `meshcat` beside that of the log.
     """
 
     def __init__(
@@ -38,9 +41,11 @@ class GrowingLog:
         station: str | StationFactory = "cell",
         real: Scenario | None = None,
         progress: Progress = ignore_progress,
+        view: MeshcatView | None = None,
     ) -> None:
         self._scenario, self._folder, self._progress = scenario, folder, progress
-        self._laboratory = Laboratory(real or scenario, station)
+        self._view, views = view, [view] if view else []
+        self._laboratory = Laboratory(real or scenario, station, views)
         kind = self._laboratory.station.kind
         header = transitions_header(scenario, kind, {"program": "diagnose"})
         self._writer = LogWriter(folder, header, resume=True)
@@ -61,6 +66,18 @@ class GrowingLog:
 
     def perform(self, plan: Plan) -> Performance:
         """Performs an experiment; what was recorded is kept if the station holds."""
+        if self._view is None:
+            return self._recorded(plan)
+        page = self._folder.parent / "meshcat" / f"episode_{self.episodes:04d}.html"
+        self._view.begin_episode()
+        found = self._recorded(plan)
+        self._view.end_episode()
+        if self._view.records:
+            self._view.save_html(page)
+        return found
+
+    def _recorded(self, plan: Plan) -> Performance:
+        """Performs an experiment, which becomes an episode."""
         number, laboratory = self.episodes, self._laboratory
         if laboratory.station.kind == "hardware":
             with self._writer.begin_episode() as episode:

@@ -13,16 +13,25 @@ _HEIGHT = 280  # pixels
 _UNITS = [*["m"] * 3, *["rad"] * 3, "N", "N m"]  # of x y z u v w f t
 
 
-def diagnosis_page(found: Diagnosis, origin: Mapping[str, Any]) -> str:
+def diagnosis_page(
+    found: Diagnosis, origin: Mapping[str, Any], is_watched: bool = False
+) -> str:
     """Returns the report as one self-contained HTML page.
 
     Args:
         found: the diagnosis.
         origin: provenance.
+        is_watched: whether there is a page of each experiment in `meshcat`.
     """
     plots = [experiment_plot(r) if r.experiment else None for r in found.rounds]
     rounds = list(zip(found.rounds, plots, strict=True))
-    return render("story.html.j2", found=found, rounds=rounds, origin=origin)
+    return render(
+        "story.html.j2",
+        found=found,
+        rounds=rounds,
+        origin=origin,
+        is_watched=is_watched,
+    )
 
 
 def experiment_plot(one: Round) -> Plot:

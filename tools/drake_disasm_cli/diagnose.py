@@ -30,6 +30,7 @@ from drake_disasm.common.user_code import import_named
 from drake_disasm.experiments import Experiment, find_experiment, registered_experiments
 from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.task.simulation import StationFactory
+from drake_disasm.visualization import MeshcatView, start_meshcat
 from drake_disasm_cli import common, hardware
 from sysid.diagnosis import Budget, Diagnosis, diagnose
 from sysid.report import diagnosis_page
@@ -66,6 +67,11 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     common.add_hidden_argument(add)
     _add_budget_arguments(add)
+    add(
+        "--html",
+        action="store_true",
+        help="save each experiment as a page that plays offline: OUT/meshcat",
+    )
     add("--yes", action="store_true", help="perform each experiment without asking")
     common.add_workers_argument(parser)
     add("--out", required=True, type=Path, metavar="DIR", help="of log and report")
@@ -107,6 +113,7 @@ def main(arguments: Sequence[str]) -> int:
     model.contact.model = args.contact or scenario.contact.model
     kinds = [kind for name in args.experiments or () for kind in _experiments(name)]
     budget = Budget(args.robot_time, _MINUTE * args.verdict_time)
+    view = MeshcatView(start_meshcat(), record=True) if args.html else None
     with (
         program.ProgressBar(unit="simulation") as progress,
         Workers(args.workers, progress=progress) as workers,
@@ -120,11 +127,12 @@ def main(arguments: Sequence[str]) -> int:
             budget=budget,
             experiments=kinds or None,
             confirm=(lambda _: True) if args.yes else _asked,
+            view=view,
             workers=workers,
             progress=progress,
         )
     origin = program.provenance("drake-disasm diagnose", arguments, 0)
-    write_text(args.out / "report.html", diagnosis_page(found, origin))
+    write_text(args.out / "report.html", diagnosis_page(found, origin, args.html))
     print(_text(found))
     print(f"report: {args.out / 'report.html'}")
     return 0 if found.is_settled else EXIT_OPEN

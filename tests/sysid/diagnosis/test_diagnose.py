@@ -50,6 +50,9 @@ def test_the_report_tells_the_story(warm) -> None:
     page = html.unescape(diagnosis_page(warm[2], {"program": "test"}))
     assert "settled: the model lacks SensorWarmUp" in page
     assert all(each.experiment in page for each in warm[2].rounds)
+    assert "(episode_0003)" in page
+    watched = diagnosis_page(warm[2], {}, is_watched=True)
+    assert '<a href="meshcat/episode_0003.html">' in watched
 
 
 def test_a_second_call_performs_nothing_more(warm) -> None:
