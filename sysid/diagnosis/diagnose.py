@@ -204,6 +204,8 @@ def _choice(
     if len(rivals) < 2:
         return None, _settled(closed)
     if not is_enough(predictions, rivals, need, math.inf):
+        if closed.verdict.ending == "unexplained":  # its rivals are guesses
+            return None, _settled(closed)
         return None, _inseparable(rivals, predictions)
     affordable = [p for p in predictions if p.is_helpful and p.duration <= left]
     if not is_enough(affordable, rivals, need, left):
