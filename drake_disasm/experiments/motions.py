@@ -130,10 +130,39 @@ class RepeatedPresses(Experiment):
 
     def phases(self, scenario: Scenario) -> Iterator[Phase]:
         """See Experiment."""
-        axis = AXES.index("z") if scenario.part.stages[0].axis != 2 else 1
+        axis = _sideways(scenario)
         yield from _press(scenario, axis, self.force, 0.0)
         yield Wait(round(self.rest / scenario.task.period))
         yield from _press(scenario, axis, self.force, 0.0)
+
+
+@register_experiment
+@dataclasses.dataclass(frozen=True)
+class LoadedStrokes(Experiment):
+    """Presses the bolt to a side, and slides it there and back, fast and slowly.
+
+    Tells one law of friction from another, and from what has its place.
+    """
+
+    force: float = quantity(
+        3.0, "N", "with which it is pressed", low=0.5, high=10.0, grid=(3.0, 6.0)
+    )
+    way: float = quantity(0.3, "1", "share of the stage", low=0.02, high=0.8)
+    slowest: float = quantity(
+        0.1, "1", "share of the greatest speed", low=0.02, high=0.5
+    )
+
+    def phases(self, scenario: Scenario) -> Iterator[Phase]:
+        """See Experiment."""
+        stage, axis = scenario.part.stages[0], _sideways(scenario)
+        end = self.way * stage.end
+        yield Move(unit(axis, 0.25 * _most(scenario, axis)), 40, self.force)
+        for share in (1.0, self.slowest):
+            yield from _to(scenario, end, share)
+            speed = share * _most(scenario, stage.axis)
+            steps = math.ceil(2.0 * end / speed)
+            yield Approach(stage.axis, 0.0, -speed, stage.effort, steps)
+        yield way_back(np.zeros(6), speeds(scenario), 40)
 
 
 @register_experiment
@@ -205,6 +234,11 @@ class Weighing(Experiment):
 
 def _most(scenario: Scenario, axis: int) -> float:
     return float(speeds(scenario)[axis])
+
+
+def _sideways(scenario: Scenario) -> int:
+    """Returns the axis along which a press meets a wall: z, if that is not the way."""
+    return AXES.index("z") if scenario.part.stages[0].axis != AXES.index("z") else 1
 
 
 def _held(scenario: Scenario) -> int:
