@@ -109,8 +109,8 @@ class World:
     @property
     def hidden(self) -> tuple[str, ...]:
         """Names that a verdict is to have: none of an effect that is in no library."""
-        names = [type(effect).__name__ for effect in self.effects]
-        return tuple(n for n in names if find_effect(n) not in UNKNOWN)
+        kinds = [type(effect) for effect in self.effects]
+        return tuple(kind.__name__ for kind in kinds if kind not in UNKNOWN)
 
     @property
     def is_in_library(self) -> bool:
@@ -141,7 +141,8 @@ def draw(group: str, number: int) -> World:
         return _drawn(group, number, part, "null", number, random)
     if number < _NULLS + _MISSING:
         return _drawn(group, number, part, "missing", number - _NULLS, random)
-    return _drawn(group, number, part, "pairs", (number - 18) // len(_PARTS), random)
+    turn = (number - _NULLS - _MISSING) // len(_PARTS)
+    return _drawn(group, number, part, "pairs", turn, random)
 
 
 def _drawn(

@@ -154,14 +154,12 @@ class LoadedStrokes(Experiment):
 
     def phases(self, scenario: Scenario) -> Iterator[Phase]:
         """See Experiment."""
-        stage, axis = scenario.part.stages[0], _sideways(scenario)
-        end = self.way * stage.end
+        axis, end = _sideways(scenario), self.way * scenario.part.stages[0].end
         yield Move(unit(axis, 0.25 * _most(scenario, axis)), 40, self.force)
         for share in (1.0, self.slowest):
-            yield from _to(scenario, end, share)
-            speed = share * _most(scenario, stage.axis)
-            steps = math.ceil(2.0 * end / speed)
-            yield Approach(stage.axis, 0.0, -speed, stage.effort, steps)
+            for there in _to(scenario, end, share):
+                yield there
+                yield dataclasses.replace(there, end=0.0, speed=-there.speed)
         yield way_back(np.zeros(6), speeds(scenario), 40)
 
 
@@ -245,7 +243,7 @@ def _held(scenario: Scenario) -> int:
     return max(1, round(_HELD / scenario.task.period))
 
 
-def _to(scenario: Scenario, end: float, share: float) -> Iterator[Phase]:
+def _to(scenario: Scenario, end: float, share: float) -> Iterator[Approach]:
     """Yields the way along the first stage to somewhere, at a share of the speed."""
     stage = scenario.part.stages[0]
     if end <= 0.0:
