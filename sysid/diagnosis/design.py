@@ -122,12 +122,18 @@ def predict(
     """
     trust = trust or {}
     known = [dataclasses.replace(rival, varied=()) for rival in rivals]
-    order = [
-        each.plan for each in _predictions(plans, known, need, progress, limits, trust)
-    ]
-    found = _predictions(order[:_LOOKED_AT], rivals, need, progress, limits, trust)
-    if order[_LOOKED_AT:] and not is_enough(found, rivals, need, math.inf):
-        found += _predictions(order[_LOOKED_AT:], rivals, need, progress, limits, trust)
+    quick = _predictions(plans, known, need, progress, limits, trust)
+
+    def exact(those: list[Prediction]) -> list[Prediction]:
+        """Returns the same, with what is uncertain of the rivals' parameters."""
+        if not any(rival.varied for rival in rivals):
+            return those
+        chosen = [each.plan for each in those]
+        return _predictions(chosen, rivals, need, progress, limits, trust)
+
+    found, rest = exact(quick[:_LOOKED_AT]), quick[_LOOKED_AT:]
+    if rest and not is_enough(found, rivals, need, math.inf):
+        found += exact(rest)
     return sorted(found, key=lambda each: -each.value)
 
 
