@@ -43,6 +43,7 @@ _MM = 1000.0  # the reward speaks millimetres, because the thesis does
 PULL_AWAY, FREE_FORCE = 0.001, 2.0
 
 STATE_NAMES = ("x", "y", "z", "u", "v", "w", "fx", "fy", "fz", "tx", "ty", "tz")
+STATE_UNITS = (*("m",) * 3, *("rad",) * 3, *("N",) * 3, *("N m",) * 3)
 ACTION_NAMES = ("dx", "dy", "dz", "du", "dv", "dw")
 REWARD_TERMS = ("progress", "force", "torque", "lift")
 

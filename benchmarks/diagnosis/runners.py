@@ -9,12 +9,17 @@ import numpy as np
 
 from diagnosis.answer import Answer
 from diagnosis.worlds import World, library
-from drake_disasm.common.progress import ignore_progress
 from drake_disasm.experiments import Plan, Removal, registered_experiments
 from drake_disasm.experiments.performing import Performance
-from sysid.diagnosis import NOTHING, Budget, GrowingLog, Need, Rival, diagnose, predict
-
-_FIRST = 3  # removals, as `diagnose` begins
+from sysid.diagnosis import (
+    NOTHING,
+    Budget,
+    GrowingLog,
+    TwinRival,
+    diagnose,
+    twin_forecasts,
+)
+from sysid.diagnosis.station_subject import FIRST
 
 
 def ours(world: World, folder: Path, seconds: float) -> Answer:
@@ -25,6 +30,7 @@ def ours(world: World, folder: Path, seconds: float) -> Answer:
         real=world.real,
         budget=Budget(seconds),
         effects=library(),
+        seed=world.seed,
     )
     performed = [each for each in found.rounds if each.experiment]
     return Answer.of(
@@ -40,7 +46,8 @@ def ours(world: World, folder: Path, seconds: float) -> Answer:
 def passive(world: World, folder: Path, seconds: float) -> Answer:
     """Records removals alone."""
 
-    plans = (Removal(seed=number).plan(world.model) for number in itertools.count())
+    seeds = itertools.count(world.seed)
+    plans = (Removal(seed=seed).plan(world.model) for seed in seeds)
     return _performed(world, folder, seconds, plans)
 
 
@@ -50,13 +57,13 @@ def by_chance(world: World, folder: Path, seconds: float) -> Answer:
 
 
 def _drawn(world: World) -> Iterator[Plan]:
-    for number in range(_FIRST):
-        yield Removal(seed=number).plan(world.model)
+    for number in range(FIRST):
+        yield Removal(seed=world.seed + number).plan(world.model)
     kinds = [kind for kind in registered_experiments() if kind is not Removal]
     plans = [each.plan(world.model) for kind in kinds for each in kind.variants()]
     plans = [plan for plan in plans if plan.phases]
-    alone = [Rival(NOTHING, world.model, 1.0)]
-    known = predict(plans, alone, Need(0.0), ignore_progress)
+    alone = [TwinRival(NOTHING, 1.0, 0.0, world.model)]
+    known = twin_forecasts(plans, alone)
     safe = sorted(each.plan.text for each in known if not each.hazard)
     by_text = {plan.text: plan for plan in plans}
     random = np.random.default_rng([world.number, len(safe)])
@@ -72,7 +79,7 @@ def _performed(
     The last one is as long as it is: whoever chooses freely gets a little more.
     """
     shutil.rmtree(folder, ignore_errors=True)
-    log = GrowingLog(world.model, folder / "log", real=world.real)
+    log = GrowingLog(world.model, folder / "log", real=world.real, seed=world.seed)
     done: list[Performance] = []
     texts = []
     while sum(each.duration for each in done) < seconds:

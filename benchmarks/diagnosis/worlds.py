@@ -26,6 +26,7 @@ PAIRS = (
     ("SensorDelay", "SensorLag"),
     ("Backlash", "Compliance"),
 )
+_SEEDS = 1000  # of noise in each world
 _PARTS = ("removal", "iiwa_peg", "iiwa_bayonet")
 #: Of each group: first seed, and how many worlds there are.
 GROUPS: Mapping[str, tuple[int, int]] = {
@@ -105,6 +106,11 @@ class World:
     def name(self) -> str:
         """Of its folder."""
         return f"{self.group}_{self.number}"
+
+    @property
+    def seed(self) -> int:
+        """Of the noise of its first episode; others follow, and no world shares one."""
+        return _SEEDS * (GROUPS[self.group][0] + self.number)
 
     @property
     def hidden(self) -> tuple[str, ...]:

@@ -1,7 +1,9 @@
 """Adding model files to a plant."""
 
+from collections.abc import Sequence
+
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, ModelInstanceIndex
+from pydrake.multibody.tree import Frame, ModelInstanceIndex, RigidBody
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.model_files import add_model
@@ -20,6 +22,15 @@ def movable_joints(url: str) -> tuple[str, ...]:
     moving = [joint for joint in joints if joint.num_velocities() == 1]
     moving.sort(key=lambda joint: joint.velocity_start())  # a file may list them anyhow
     return tuple(joint.name() for joint in moving)
+
+
+def weld_root(plant: MultibodyPlant, bodies: Sequence[RigidBody]) -> None:
+    """Welds bodies that are no joint's child to the world: an arm's base."""
+    joints = [plant.get_joint(i) for i in plant.GetJointIndices()]
+    held = {int(joint.child_body().index()) for joint in joints}
+    for body in bodies:
+        if int(body.index()) not in held:
+            plant.WeldFrames(plant.world_frame(), body.body_frame())
 
 
 def model_frame(

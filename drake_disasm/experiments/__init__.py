@@ -1,10 +1,17 @@
 """Experiments: motions by which a station finds out what its model lacks.
 
-To add one to the library: a class in `motions`. To add one of your own from anywhere
-else: `register_experiment`.
+To add one to the library: a class in `motions`, or in `joint_motions` for an arm in
+free space. To add one of your own from anywhere else: `register_experiment`.
 """
 
-from drake_disasm.experiments.base import FREE_SPACE, Experiment, Plan
+from drake_disasm.experiments.base import (
+    FREE_SPACE,
+    AnyExperiment,
+    Experiment,
+    JointExperiment,
+    JointPlan,
+    Plan,
+)
 from drake_disasm.experiments.performer import Performer
 from drake_disasm.experiments.phases import (
     Approach,
@@ -19,6 +26,7 @@ from drake_disasm.experiments.registry import (
     find_experiment,
     register_experiment,
     registered_experiments,
+    registered_joint_experiments,
 )
 
 # Experiments are registered and documented in the order of these lines.
@@ -34,17 +42,28 @@ from drake_disasm.experiments.motions import (
     Rest,
     Weighing,
 )
+from drake_disasm.experiments.joint_motions import (
+    JointExcitation,
+    JointStrokes,
+    PostureSteps,
+)
 # isort: on
 
 __all__ = [
     "FREE_SPACE",
+    "AnyExperiment",
     "Approach",
     "Experiment",
+    "JointExcitation",
+    "JointExperiment",
+    "JointPlan",
+    "JointStrokes",
     "LoadedStrokes",
     "Move",
     "Performer",
     "Phase",
     "Plan",
+    "PostureSteps",
     "Presses",
     "Removal",
     "RepeatedPresses",
@@ -60,4 +79,5 @@ __all__ = [
     "find_experiment",
     "register_experiment",
     "registered_experiments",
+    "registered_joint_experiments",
 ]

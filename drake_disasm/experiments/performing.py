@@ -9,7 +9,7 @@ from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progre
 from drake_disasm.effects import PoseEffect, pose_weights
 from drake_disasm.experiments.base import Plan
 from drake_disasm.experiments.performer import Performer
-from drake_disasm.mdp import BoltState, Outcome, TaskGeometry
+from drake_disasm.mdp import STATE_NAMES, BoltState, Outcome, TaskGeometry
 from drake_disasm.safety import SafetyConfig
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations import Station
@@ -55,6 +55,10 @@ class Performance:
         """Greatest force and torque on the bolt [N, N m]."""
         state = BoltState.from_vector(self.observations)
         return float(state.force.max()), float(state.torque.max())
+
+    def channel(self, name: str) -> np.ndarray:
+        """Returns what was measured in a channel of the state (n + 1,)."""
+        return np.asarray(self.observations[:, STATE_NAMES.index(name)])
 
 
 class Laboratory:

@@ -6,10 +6,10 @@ from typing import TypeVar
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.executors import import_in_workers
 from drake_disasm.common.quantity import closest
-from drake_disasm.experiments.base import Experiment
+from drake_disasm.experiments.base import AnyExperiment, Experiment, JointExperiment
 
-_Kind = TypeVar("_Kind", bound=type[Experiment])
-_experiments: dict[str, type[Experiment]] = {}
+_Kind = TypeVar("_Kind", bound=type[AnyExperiment])
+_experiments: dict[str, type[AnyExperiment]] = {}
 
 
 def register_experiment(experiment: _Kind) -> _Kind:
@@ -19,7 +19,7 @@ def register_experiment(experiment: _Kind) -> _Kind:
         DisasmError: not a complete experiment, or another one has its name.
     """
     name = experiment.__name__
-    missing = ", ".join(sorted(experiment.__abstractmethods__))
+    missing = ", ".join(sorted(getattr(experiment, "__abstractmethods__", ())))
     if missing:
         raise DisasmError(f"experiment {name}: lacks {missing}; define it")
     for field in dataclasses.fields(experiment):
@@ -40,11 +40,16 @@ def register_experiment(experiment: _Kind) -> _Kind:
 
 
 def registered_experiments() -> tuple[type[Experiment], ...]:
-    """Returns all experiments: the library's in the documentation's order, others."""
-    return tuple(_experiments.values())
+    """Returns experiments in contact: the library's in the manual's order, others."""
+    return tuple(k for k in _experiments.values() if issubclass(k, Experiment))
 
 
-def find_experiment(name: str) -> type[Experiment]:
+def registered_joint_experiments() -> tuple[type[JointExperiment], ...]:
+    """Returns experiments of an arm in free space, in the same order."""
+    return tuple(k for k in _experiments.values() if issubclass(k, JointExperiment))
+
+
+def find_experiment(name: str) -> type[AnyExperiment]:
     """Returns the experiment of a name.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The diagram that plays a motion of the joints on the cell, and records it."""
+"""The diagram that plays motions of the joints on the cell, and records them."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ from pydrake.trajectories import PiecewisePolynomial
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.free_motion.table import MotionTable
-from drake_disasm.free_motion.way import with_way
+from drake_disasm.free_motion.way import with_straight_way, with_way
 from drake_disasm.stations import Station
 from drake_disasm.stations.advance import advance
 
@@ -30,7 +30,7 @@ _SLICE = 0.1  # s, between two updates of the progress
 
 
 class MotionPlayer:
-    """Plays a motion on a station of the cell, simulated or real.
+    """Plays motions on a station of the cell, simulated or real, one after the other.
 
     Attributes:
         station: that moves.
@@ -60,14 +60,12 @@ class MotionPlayer:
         self.station, self.period = station, station.control_period
         whole, self.begin = with_way(station, motion)
         self.end = float(whole.time[-1])
-        path = PiecewisePolynomial.CubicShapePreserving(
-            whole.time, whole.q.T, zero_end_point_derivatives=True
-        )
+        self._has_begun, self._last = False, motion.q[-1]
         builder = DiagramBuilder()
         builder.AddSystem(station)
-        source = builder.AddNamedSystem("motion", TrajectorySource(path))
+        self._source = builder.AddNamedSystem("motion", TrajectorySource(_path(whole)))
         command = station.GetInputPort(f"{station.arm}.position")
-        builder.Connect(source.get_output_port(), command)
+        builder.Connect(self._source.get_output_port(), command)
         assert station.grip_command is not None  # every arm here has a gripper
         grip = builder.AddNamedSystem(
             "grip", ConstantVectorSource([station.grip_command])
@@ -90,7 +88,7 @@ class MotionPlayer:
     def play(
         self, realtime_rate: float = 0.0, progress: Progress = ignore_progress
     ) -> None:
-        """Goes to where the motion begins, and plays it.
+        """Goes to where the motion begins, and plays it, once.
 
         Args:
             realtime_rate: 1 for real time, 0 for full speed.
@@ -102,18 +100,33 @@ class MotionPlayer:
             DivergedError: the arm has run into something, most likely.
         """
         station, simulator = self.station, self.simulator
-        station.begin(station.GetMyMutableContextFromRoot(self._context))
-        station.attach(simulator)
-        simulator.set_target_realtime_rate(realtime_rate)
-        simulator.Initialize()
-        for i in range(1, int(np.ceil(self.end / _SLICE)) + 1):
-            advance(simulator, min(i * _SLICE, self.end), "cell")
+        if not self._has_begun:
+            station.begin(station.GetMyMutableContextFromRoot(self._context))
+            station.attach(simulator)
+            simulator.set_target_realtime_rate(realtime_rate)
+            simulator.Initialize()
+            self._has_begun = True
+        begin = self._context.get_time()
+        for i in range(1, int(np.ceil((self.end - begin) / _SLICE)) + 1):
+            advance(simulator, min(begin + i * _SLICE, self.end), "cell")
             station.check()
-            done, total = round(self._context.get_time()), round(self.end)
+            done = round(self._context.get_time() - begin)
+            total = round(self.end - begin)
             progress(ProgressUpdate("playing the motion", done, total))
 
+    def follow_with(self, motion: MotionTable) -> None:
+        """Prepares another motion, after one that was played to its end.
+
+        The arm goes straight from where it stands to where the motion begins.
+        """
+        now = self._context.get_time()
+        whole, begin = with_straight_way(self._last, motion)
+        self._last = motion.q[-1]
+        self.begin, self.end = now + begin, now + float(whole.time[-1])
+        self._source.UpdateTrajectory(_path(MotionTable(now + whole.time, whole.q)))
+
     def columns(self) -> dict[str, np.ndarray]:
-        """Returns what was recorded of the motion so far, by the log's columns.
+        """Returns what was recorded of the last motion so far, by the log's columns.
 
         Time begins with the motion. Where `play` was stopped on the way to it, there
         are no rows.
@@ -123,3 +136,9 @@ class MotionPlayer:
         kept = time >= self.begin - 0.5 * self.period
         columns = {name: log.data().T[kept] for name, log in logs.items()}
         return {"time": time[kept] - self.begin} | columns
+
+
+def _path(motion: MotionTable) -> PiecewisePolynomial:
+    return PiecewisePolynomial.CubicShapePreserving(
+        motion.time, motion.q.T, zero_end_point_derivatives=True
+    )

@@ -32,6 +32,7 @@ class GrowingLog:
         progress: gets each step.
         view: shows each experiment; if it records, a page of each is kept in the
             folder `meshcat` beside that of the log.
+        seed: of the first episode's noise; of each later one it is one more.
     """
 
     def __init__(
@@ -42,7 +43,9 @@ class GrowingLog:
         real: Scenario | None = None,
         progress: Progress = ignore_progress,
         view: MeshcatView | None = None,
+        seed: int = 0,
     ) -> None:
+        self.seed = seed
         self._scenario, self._folder, self._progress = scenario, folder, progress
         self._view, views = view, [view] if view else []
         self._laboratory = Laboratory(real or scenario, station, views)
@@ -78,13 +81,13 @@ class GrowingLog:
 
     def _recorded(self, plan: Plan) -> Performance:
         """Performs an experiment, which becomes an episode."""
-        number, laboratory = self.episodes, self._laboratory
+        seed, laboratory = self.seed + self.episodes, self._laboratory
         if laboratory.station.kind == "hardware":
             with self._writer.begin_episode() as episode:
                 recorder = EpisodeRecorder(laboratory.simulation, episode)
-                return laboratory.perform(plan, number, recorder, self._progress)
+                return laboratory.perform(plan, seed, recorder, self._progress)
         recorder = EpisodeRecorder(laboratory.simulation)
-        found = laboratory.perform(plan, number, recorder, self._progress)
+        found = laboratory.perform(plan, seed, recorder, self._progress)
         self._writer.write_episode(flat_columns("transitions", recorder.columns()))
         return found
 

@@ -1,9 +1,11 @@
 """The hypotheses that a verdict leaves: what the model may lack, each fitted."""
 
+import abc
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -12,7 +14,7 @@ from drake_disasm.scenario import Scenario
 from sysid.diagnosis.growing_log import GrowingLog
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.detection import DetectionLimit
-from sysid.effect_selection.effect_names import effect_class
+from sysid.effect_selection.effect_names import effect_class, short_names
 from sysid.fitting.candidates import Candidate, candidates
 from sysid.fitting.fit import Fit
 from sysid.fitting.fitter import Fitter
@@ -37,25 +39,61 @@ _MOST = 6  # hypotheses about what a log could not have shown
 
 
 @dataclasses.dataclass(frozen=True)
-class Rival:
+class Rival(abc.ABC):
     """A hypothesis.
 
     Attributes:
-        name: of its effects, or NOTHING.
-        scenario: the model with them, fitted.
+        name: of its effects that not all have, or NOTHING.
         weight: share of draws of the log's folds in which it predicts held-out rows
             best; of those that the verdict can't tell apart the mean of that and of the
             same for each; of what the log could not have shown, the same for each.
-        varied: the scenario, moved by a standard deviation along each axis of the
-            covariance of its effects' parameters.
         loss: that it leaves of rows of the log that it was not fitted to.
+        is_guess: whether the log speaks against it, and an experiment is to show
+            whether that stands.
     """
 
     name: str
-    scenario: Scenario
     weight: float
+    loss: float
+    is_guess: bool = dataclasses.field(default=False, kw_only=True)
+
+    @property
+    @abc.abstractmethod
+    def is_uncertain(self) -> bool:
+        """Whether any of its parameters is."""
+
+    @property
+    @abc.abstractmethod
+    def with_known_parameters(self) -> Self:
+        """The same, as if its parameters were known."""
+
+
+@dataclasses.dataclass(frozen=True)
+class TwinRival(Rival):
+    """A hypothesis about a station in contact.
+
+    Attributes:
+        scenario: the model with its effects, fitted.
+        varied: the scenario, moved by a standard deviation along each axis of the
+            covariance of its effects' parameters.
+    """
+
+    scenario: Scenario
     varied: tuple[Scenario, ...] = ()
-    loss: float = 0.0
+
+    @property
+    def is_uncertain(self) -> bool:
+        """See Rival."""
+        return bool(self.varied)
+
+    @property
+    def with_known_parameters(self) -> Self:
+        """See Rival."""
+        return dataclasses.replace(self, varied=())
+
+
+#: Returns the hypothesis of a name, a fit, a weight and a loss; None: there is none.
+Make = Callable[[str, Fit, float, float], Rival | None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -96,57 +134,106 @@ class Need:
         return np.sqrt(np.maximum(missing, BY_CHANCE**2))
 
 
-def rivals_of(
+@dataclasses.dataclass(frozen=True)
+class _Set:
+    """Effects that may be what the model lacks.
+
+    Attributes:
+        effects: all of them.
+        is_equal: whether the log can't tell it from the others.
+        is_guess: see Rival.
+    """
+
+    effects: tuple[Candidate, ...]
+    is_equal: bool = True
+    is_guess: bool = False
+
+
+def open_rivals(
     closed: ClosedLoop,
-    log: GrowingLog,
+    model: LogModel,
+    make: Make,
     workers: Workers,
     folder: Path | None = None,
-    performed: int = 0,
+    asked: Sequence[tuple[str, ...]] = (),
 ) -> tuple[Rival, ...]:
-    """Returns the hypotheses that are left; one alone is settled.
+    """Returns the hypotheses that a verdict leaves open; none if it leaves none.
 
     Args:
         closed: the verdict.
-        log: on which it is.
+        model: of the log on which it is.
+        make: of a fit, the hypothesis.
         workers: fit.
         folder: of a cache of fits.
-        performed: how many experiments were.
+        asked: names of the verdict before each experiment.
     """
-    verdict, model = closed.verdict, log.model()
     fitter, library = _fitter(closed, model, workers, folder), candidates(model)
-    is_open = verdict.ambiguous or verdict.suggested
-    if is_open:
-        sets = list(_sets(closed, library))
-    elif verdict.ending == "unexplained" and performed < _TRIED:
-        sets = list(_suspects(closed, library))
-    else:
-        return _unseen(closed, log, workers, folder)
-    fits = [fitter.fit(effects, _start(closed.last, effects)) for effects, _ in sets]
+    sets = list(_open_sets(closed, library, asked))
+    if len(sets) < 2:
+        return ()
+    fits = [fitter.fit(s.effects, _start(closed.last, s.effects)) for s in sets]
     shares = best_of_folds([fit.held_out_losses for fit in fits])
-    equal = 1.0 / max(1, sum(is_ambiguous for _, is_ambiguous in sets))
+    equal = 1.0 / max(1, sum(each.is_equal for each in sets))
     found = []
-    for (effects, is_ambiguous), fit, share in zip(
-        sets, fits, shares.tolist(), strict=True
+    for each, name, fit, share in zip(
+        sets, _names(sets), fits, shares.tolist(), strict=True
     ):
-        scenario = fit.model.scenario_at(fit.theta)
-        if scenario is not None:
-            name = " and ".join(e.name for e in effects) or NOTHING
-            weight = 0.5 * (share + equal) if is_ambiguous else max(share, _LEAST)
-            loss = float(fit.held_out_losses.sum())
-            found.append(Rival(name, scenario, weight, tuple(_varied(fit)), loss))
-    return tuple(sorted(found, key=lambda rival: -rival.weight))
+        weight = 0.5 * (share + equal) if each.is_equal else max(share, _LEAST)
+        rival = make(name, fit, weight, float(fit.held_out_losses.sum()))
+        if rival is not None:
+            found.append(dataclasses.replace(rival, is_guess=each.is_guess))
+    return tuple(sorted(found, key=lambda rival: (rival.is_guess, -rival.weight)))
 
 
-def _varied(fit: Fit) -> Iterator[Scenario]:
-    """Yields a fit's scenario, moved along each axis of its parameters' covariance."""
+def _open_sets(
+    closed: ClosedLoop, library: Sequence[Candidate], asked: Sequence[tuple[str, ...]]
+) -> Iterator[_Set]:
+    """Yields sets of effects among which a verdict leaves the choice.
+
+    What few seconds of contact show may be gone with the next: a single name has to
+    stand once after an experiment that was made to refute it, and a residual that
+    nothing explains is asked about more often.
+    """
+    verdict, count = closed.verdict, len(closed.verdict.confirmed)
+    is_left = verdict.ending in ("unexplained", "partly") and len(asked) < _TRIED
+    is_single = count == 1 and closed.last.model.makes_contact
+    is_new = not asked or set(asked[-1]) != set(verdict.names)
+    if verdict.ambiguous or verdict.suggested:
+        yield from _ambiguous_sets(closed, library)
+    elif (not count and is_left) or (is_single and (is_left or is_new)):
+        yield from _suspects(closed, library)
+
+
+def _names(sets: Sequence[_Set]) -> list[str]:
+    """Returns a name for each of some sets, of those effects that not all have."""
+    common = set.intersection(*({e.name for e in each.effects} for each in sets))
+    own = [[e.name for e in each.effects if e.name not in common] for each in sets]
+    short = [short_names(names) for names in own]
+    found = short if len(set(short)) == len(short) else map(" and ".join, own)
+    return [name or NOTHING for name in found]
+
+
+def twin_rival(name: str, fit: Fit, weight: float, loss: float) -> TwinRival | None:
+    """Returns the hypothesis of a fit to a log of a station in contact; see `Make`."""
+    scenario = fit.model.scenario_at(fit.theta)
+    if scenario is None:
+        return None
+    varied = [fit.model.scenario_at(theta) for theta in varied_parameters(fit)]
+    known = tuple(each for each in varied if each is not None)
+    return TwinRival(name, weight, loss, scenario, known)
+
+
+def varied_parameters(fit: Fit) -> Iterator[Array]:
+    """Yields a fit's parameters (p,), moved along each axis of their covariance.
+
+    By a standard deviation each.
+    """
     scaling, u = Scaling(fit.model.parameters), fit.linearisation.u
     covariance = np.nan_to_num(fit.covariance) if len(u) else np.zeros((0, 0))
     variances, axes = np.linalg.eigh(covariance)
     for variance, axis in zip(variances.tolist(), axes.T, strict=True):
         moved = u + axis * math.sqrt(max(variance, 0.0))
-        scenario = fit.model.scenario_at(scaling.from_unit(np.clip(moved, 0.0, 1.0)))
-        if scenario is not None:
-            yield scenario
+        yield scaling.from_unit(np.clip(moved, 0.0, 1.0))
 
 
 def best_of_folds(losses: Sequence[np.ndarray], seed: int = 0) -> np.ndarray:
@@ -169,21 +256,16 @@ def _start(fit: Fit, effects: Sequence[Candidate]) -> Fit | None:
     return fit if all(e.name in kept for e in fit.effects) else None
 
 
-def _sets(
-    closed: ClosedLoop, library: Sequence[Candidate]
-) -> Iterator[tuple[tuple[Candidate, ...], bool]]:
-    """Yields sets of effects that are left, the verdict's first.
-
-    And whether the verdict can't tell each from its own.
-    """
+def _ambiguous_sets(closed: ClosedLoop, library: Sequence[Candidate]) -> Iterator[_Set]:
+    """Yields sets of effects that are left, the verdict's first."""
     chosen = closed.last.effects
-    yield chosen, True
+    yield _Set(chosen)
     for standing in closed.verdict.standings:
         rest = tuple(e for e in chosen if e.name != standing.name)
         if standing.status == "suggested":
-            yield rest, False
+            yield _Set(rest, is_equal=False)
         for names in standing.rivals:
-            yield (*rest, *(_shaped(closed, name, library) for name in names)), True
+            yield _Set((*rest, *(_shaped(closed, name, library) for name in names)))
 
 
 def _shaped(closed: ClosedLoop, name: str, library: Sequence[Candidate]) -> Candidate:
@@ -195,15 +277,15 @@ def _shaped(closed: ClosedLoop, name: str, library: Sequence[Candidate]) -> Cand
     return next(each for each in library if each.name == name)
 
 
-def _suspects(
-    closed: ClosedLoop, library: Sequence[Candidate]
-) -> Iterator[tuple[tuple[Candidate, ...], bool]]:
-    """Yields what explains most of a residual that is unexplained, and nothing."""
-    yield (), False
+def _suspects(closed: ClosedLoop, library: Sequence[Candidate]) -> Iterator[_Set]:
+    """Yields the verdict, and what else explains most of the residual by itself."""
+    chosen = closed.last.effects
+    yield _Set(chosen, is_equal=bool(chosen))
     names = dict.fromkeys(gain.term.names for gain in closed.search.begin)
     single = [own[0] for own in names if len(own) == 1]
-    for name in single[:_SUSPECTS]:
-        yield (_shaped(closed, name, library),), True
+    others = [name for name in single if name not in [e.name for e in chosen]]
+    for name in others[:_SUSPECTS]:
+        yield _Set((_shaped(closed, name, library),), is_guess=True)
 
 
 def _fitter(
@@ -213,9 +295,9 @@ def _fitter(
     return Fitter.of(model, workers, delta, closed.last.settings, folder)
 
 
-def _unseen(
+def unseen_rivals(
     closed: ClosedLoop, log: GrowingLog, workers: Workers, folder: Path | None
-) -> tuple[Rival, ...]:
+) -> tuple[TwinRival, ...]:
     """Returns the verdict, and what its log does not speak against, each as a rival.
 
     An effect that its fit leaves at no size is one of a size that matters, unless the
@@ -225,22 +307,22 @@ def _unseen(
     if scenario is None:
         return ()
     if closed.verdict.confirmed:
-        return (Rival(" and ".join(closed.verdict.confirmed), scenario, 1.0),)
+        name = " and ".join(closed.verdict.confirmed)
+        return (TwinRival(name, 1.0, 0.0, scenario),)
     model = log.model(scenario)
     fitter, library = _fitter(closed, model, workers, folder), candidates(model)
     alone, without = fitter.fit(()).loss, _loss(model)
-    found = [Rival(NOTHING, scenario, 1.0, loss=alone)]
+    found = [TwinRival(NOTHING, 1.0, alone, scenario)]
     for kind in sorted(closed.verdict.undetectable)[:_MOST]:
         effect = _of_size(kind, closed.verdict.limits)
         if effect is None:
             continue
         more = dataclasses.replace(scenario, effects=[*scenario.effects, effect])
         loss = alone + _loss(log.model(more)) - without
-        rival = Rival(kind, more, 1.0, loss=loss)
+        rival = TwinRival(kind, 1.0, loss, more)
         fit = fitter.fit(tuple(each for each in library if each.name == kind)[:1])
-        fitted = fit.model.scenario_at(fit.theta)
-        if fitted is not None and alone - fit.loss >= BY_CHANCE**2:
-            rival = Rival(kind, fitted, 1.0, tuple(_varied(fit)), fit.loss)
+        if alone - fit.loss >= BY_CHANCE**2:
+            rival = twin_rival(kind, fit, 1.0, fit.loss) or rival
         if rival.loss - alone < BY_CHANCE**2:
             found.append(rival)
     return tuple(dataclasses.replace(each, weight=1.0 / len(found)) for each in found)

@@ -40,6 +40,16 @@ def by_kind(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
     return found
 
 
+def short_names(names: Sequence[str]) -> str:
+    """Returns names, those of a kind at several joints as one, joined by "and"."""
+    return " and ".join(
+        f"{kind} of {len(joints)} joints"
+        if len(joints) > 1
+        else ".".join((kind, *joints))
+        for kind, joints in by_kind(names).items()
+    )
+
+
 def effects_in_words(names: Sequence[str]) -> str:
     """Returns effects in words: "dry friction at 6 joints and rotor inertia"."""
     phrases = []

@@ -23,6 +23,7 @@ from sysid.effect_selection.effect_names import (
     effects_in_words,
     enumeration,
     in_words,
+    short_names,
 )
 from sysid.effect_selection.replication import Status
 from sysid.effect_selection.verdict import ParameterValue, Verdict
@@ -91,8 +92,7 @@ class KindLine:
     @property
     def title(self) -> str:
         """The name of a single effect, else the kind and the number of joints."""
-        ((kind, joints),) = by_kind(self.names).items()
-        return self.names[0] if len(joints) < 2 else f"{kind} of {len(joints)} joints"
+        return short_names(self.names)
 
     @property
     def words(self) -> str:

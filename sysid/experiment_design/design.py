@@ -9,8 +9,8 @@ from scipy.optimize import minimize
 
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
-from sysid.experiment_design.arm_limits import CollisionFreeSpace, JointLimits
-from sysid.experiment_design.fourier import FourierMotion
+from drake_disasm.free_motion.arm_limits import CollisionFreeSpace, JointLimits
+from drake_disasm.free_motion.fourier import FourierMotion
 from sysid.experiment_design.information import ArmExperiment, condition_of
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from drake_disasm.common.files import make_folder, write_figure, write_json, write_text
-from sysid.experiment_design.arm_limits import JointLimits
+from drake_disasm.free_motion.arm_limits import JointLimits
 from sysid.experiment_design.design import Design
 from sysid.experiment_design.information import ArmExperiment
 

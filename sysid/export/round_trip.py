@@ -11,6 +11,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JointActuatorIndex, MultibodyForces
 
+from drake_disasm.cell.parsing import weld_root
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.resources import package_map
 from drake_disasm.common.text import clipped
@@ -18,7 +19,6 @@ from drake_disasm.effects import ArmEffect
 from sysid.export.identified_arm import DRY, HELD, IdentifiedArm
 from sysid.export.xml_edits import parsed
 from sysid.models.arm_motion import ArmMotion
-from sysid.models.arm_plant import weld_root
 from sysid.models.joint_motion import JointMotionModel
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import PrismaticJoint, RigidBody
 
-from drake_disasm.cell.parsing import add_model
+from drake_disasm.cell.parsing import add_model, weld_root
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.quantity import closest
 from drake_disasm.common.resources import ONE_JOINT_MODELS
@@ -82,15 +82,6 @@ class ArmPlant:
     def last_body(self) -> int:
         """The number of the link that is farthest from the base."""
         return _farthest(self.plant, self.bodies)
-
-
-def weld_root(plant: MultibodyPlant, bodies: Sequence[RigidBody]) -> None:
-    """Welds bodies that are no joint's child to the world: an arm's base."""
-    joints = [plant.get_joint(i) for i in plant.GetJointIndices()]
-    held = {int(joint.child_body().index()) for joint in joints}
-    for body in bodies:
-        if int(body.index()) not in held:
-            plant.WeldFrames(plant.world_frame(), body.body_frame())
 
 
 def _farthest(plant: MultibodyPlant, bodies: Sequence[RigidBody]) -> int:

@@ -10,7 +10,6 @@ from sysid.report.plots import MEASURED, Plot, finish
 from sysid.report.templates import render
 
 _HEIGHT = 280  # pixels
-_UNITS = [*["m"] * 3, *["rad"] * 3, "N", "N m"]  # of x y z u v w f t
 
 
 def diagnosis_page(
@@ -48,8 +47,7 @@ def experiment_plot(one: Round) -> Plot:
             name="measured",
         )
     )
-    unit = dict(zip("xyzuvwft", _UNITS, strict=True))[one.channel[0]]
     figure.update_xaxes(title_text="time [s]")
-    figure.update_yaxes(title_text=f"{one.channel} [{unit}]")
+    figure.update_yaxes(title_text=f"{one.channel} [{one.unit}]")
     finish(figure, _HEIGHT)
     return Plot(figure, "In the channel in which the hypotheses differ most.")

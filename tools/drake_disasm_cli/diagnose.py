@@ -12,6 +12,9 @@ torque, the workspace and the arm's joint limits under every hypothesis. Before 
 a person is asked, unless --yes. The log, the fits and the story of the rounds
 (`report.html`, `diagnosis.json`) are in --out; after Ctrl-C the same command goes on.
 
+With --kind joint_motion (torques) or joint_response (positions) the arm takes the bolt
+out and moves in free space beside the bench, and the model of the arm is diagnosed.
+
 Exit status: 0 if one hypothesis is left, 3 if not, 2 for input that can't be used.
 """
 
@@ -25,18 +28,34 @@ from pathlib import Path
 
 from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.files import write_text
+from drake_disasm.common.files import make_folder, write_text
+from drake_disasm.common.progress import Progress
 from drake_disasm.common.user_code import import_named
-from drake_disasm.experiments import Experiment, find_experiment, registered_experiments
+from drake_disasm.experiments import (
+    AnyExperiment,
+    Experiment,
+    JointExperiment,
+    find_experiment,
+    registered_experiments,
+    registered_joint_experiments,
+)
 from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.stations import make_station
 from drake_disasm.task.simulation import StationFactory
 from drake_disasm.visualization import MeshcatView, start_meshcat
 from drake_disasm_cli import common, hardware
-from sysid.diagnosis import Budget, Diagnosis, diagnose
+from sysid.diagnosis import Budget, Diagnosis, GrowingArmLog, GrowingLog, arm_of_station
+from sysid.diagnosis.arm_log import KINDS
+from sysid.diagnosis.arm_subject import ArmSubject
+from sysid.diagnosis.loop import pursue
+from sysid.diagnosis.station_subject import StationSubject
+from sysid.diagnosis.subject import Subject
 from sysid.report import diagnosis_page
 from sysid.workers import Workers
 
 EXIT_OPEN = 3
+
+_IN_CONTACT = "transitions"
 
 _MINUTE = 60.0  # s
 _EXAMPLES = """examples:
@@ -46,6 +65,8 @@ _EXAMPLES = """examples:
       --verdict-time 5 --out out/peg
   drake-disasm diagnose --station hardware --hardware-config cell.yaml \\
       --scenario removal --experiments Presses Reversals Rest --out out/cell
+  drake-disasm diagnose --scenario removal --kind joint_motion --hidden arm.yaml \\
+      --yes --out out/arm           the arm alone, in free space
 """
 
 
@@ -58,6 +79,13 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         add, "cell", "on which experiments are performed", hardware=True
     )
     hardware.add_config_argument(add)
+    add(
+        "--kind",
+        choices=(_IN_CONTACT, *KINDS),
+        default=_IN_CONTACT,
+        help="of the log: steps of the task, or the joints' torques or response in "
+        f"free space (default: {_IN_CONTACT})",
+    )
     add(
         "--contact",
         choices=("impact", "hydroelastic"),
@@ -93,13 +121,15 @@ def _add_budget_arguments(add: Callable[..., object]) -> None:
         metavar="MIN",
         help="of the computer for each verdict (default: as long as it takes)",
     )
-    names = ", ".join(kind.__name__ for kind in registered_experiments())
+    contact, free = registered_experiments(), registered_joint_experiments()
+    names = ", ".join(kind.__name__ for kind in contact)
+    of_joints = ", ".join(kind.__name__ for kind in free)
     add(
         "--experiments",
         nargs="+",
         metavar="NAME|FILE.py",
-        help=f"to choose from: {names}, or all of a file of your own "
-        "(@register_experiment; default: all of these)",
+        help=f"to choose from: {names}; of joints {of_joints}; or all of a file of "
+        "your own (@register_experiment; default: all of the kind)",
     )
 
 
@@ -108,29 +138,19 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     hardware.refuse_contradictions(args, ["hardware_config"], {"hidden": None})
     scenario = load_scenario(args.scenario, args.overrides)
+    _refuse_contradictions(args)
     real = common.real_scenario(args, scenario)
-    model = dataclasses.replace(scenario, contact=copy.copy(scenario.contact))
-    model.contact.model = args.contact or scenario.contact.model
     kinds = [kind for name in args.experiments or () for kind in _experiments(name)]
     budget = Budget(args.robot_time, _MINUTE * args.verdict_time)
-    view = MeshcatView(start_meshcat(), record=True) if args.html else None
+    confirm = (lambda _: True) if args.yes else _asked
     with (
         program.ProgressBar(unit="simulation") as progress,
         Workers(args.workers, progress=progress) as workers,
         _station(args, scenario) as station,
     ):
-        found = diagnose(
-            model,
-            args.out,
-            station=station,
-            real=real,
-            budget=budget,
-            experiments=kinds or None,
-            confirm=(lambda _: True) if args.yes else _asked,
-            view=view,
-            workers=workers,
-            progress=progress,
-        )
+        make = _station_subject if args.kind == _IN_CONTACT else _arm_subject
+        subject = make(args, scenario, station, real, kinds, progress)
+        found = pursue(subject, args.out, budget, confirm, workers)
     origin = program.provenance("drake-disasm diagnose", arguments, 0)
     write_text(args.out / "report.html", diagnosis_page(found, origin, args.html))
     print(_text(found))
@@ -138,7 +158,66 @@ def main(arguments: Sequence[str]) -> int:
     return 0 if found.is_settled else EXIT_OPEN
 
 
-def _experiments(name: str) -> list[type[Experiment]]:
+def _refuse_contradictions(args: argparse.Namespace) -> None:
+    """Refuses options that are for a station in contact alone.
+
+    Raises:
+        DisasmError: names the first.
+    """
+    if args.kind != _IN_CONTACT:
+        for name in ("contact", "html"):
+            if getattr(args, name):
+                raise DisasmError(
+                    f"--{name}: an arm in free space has none; leave it out"
+                )
+
+
+def _station_subject(
+    args: argparse.Namespace,
+    scenario: Scenario,
+    station: str | StationFactory,
+    real: Scenario,
+    kinds: Sequence[type[AnyExperiment]],
+    progress: Progress,
+) -> Subject:
+    """Returns a station in contact, as what is diagnosed."""
+    model = dataclasses.replace(scenario, contact=copy.copy(scenario.contact))
+    model.contact.model = args.contact or scenario.contact.model
+    view = MeshcatView(start_meshcat(), record=True) if args.html else None
+    log = GrowingLog(model, args.out / "log", station, real, progress, view)
+    own = [kind for kind in kinds if issubclass(kind, Experiment)]
+    _refuse_others(kinds, own, args.kind)
+    return StationSubject(model, log, own or None, None, progress)
+
+
+def _arm_subject(
+    args: argparse.Namespace,
+    scenario: Scenario,
+    station: str | StationFactory,
+    real: Scenario,
+    kinds: Sequence[type[AnyExperiment]],
+    progress: Progress,
+) -> Subject:
+    """Returns the station's arm in free space, as what is diagnosed."""
+    own = [kind for kind in kinds if issubclass(kind, JointExperiment)]
+    _refuse_others(kinds, own, args.kind)
+    make_folder(args.out)
+    made = make_station(station, real) if isinstance(station, str) else station(real)
+    arm, space, header = arm_of_station(made, scenario, args.out)
+    log = GrowingArmLog(arm, space, header, args.out, args.kind, progress)
+    return ArmSubject(log, own or None, None, progress)
+
+
+def _refuse_others(
+    kinds: Sequence[type[AnyExperiment]], own: Sequence[type[AnyExperiment]], kind: str
+) -> None:
+    """Raises DisasmError for the first experiment that is not for a kind of log."""
+    for each in kinds:
+        if each not in own:
+            raise DisasmError(f"--experiments {each.__name__}: not for --kind {kind}")
+
+
+def _experiments(name: str) -> list[type[AnyExperiment]]:
     """Returns the experiment of a name, or those of a file.
 
     Raises:
@@ -147,7 +226,8 @@ def _experiments(name: str) -> list[type[Experiment]]:
     if not name.endswith(".py"):
         return [find_experiment(name)]
     module = import_named(name, "experiments").__name__
-    found = [kind for kind in registered_experiments() if kind.__module__ == module]
+    known = (*registered_experiments(), *registered_joint_experiments())
+    found = [kind for kind in known if kind.__module__ == module]
     if not found:
         raise DisasmError(
             f"{name}: registers no experiment; put @register_experiment above the class"
@@ -181,13 +261,14 @@ def _asked(question: str) -> bool:
 
 def _text(found: Diagnosis) -> str:
     """Returns the story of a diagnosis in lines."""
-    lines = [f"three removals: {found.first_time:.0f} s of robot time"]
+    lines = [f"before the first verdict: {found.first_time:.0f} s of robot time"]
     for each in found.rounds:
         left = ", ".join(f"{name} {w:.2f}" for name, w in each.rivals.items())
         lines.append(f"left: {left}")
         if each.experiment:
             ended = f", {each.ended}" if each.ended else ""
-            force = f"at most {each.force:.1f} N{ended}"
-            lines.append(f"{each.experiment}: {each.robot_time:.0f} s, {force}")
+            most = f"{each.force:.1f} N" if each.force else f"{each.torque:.1f} N m"
+            time = f"{each.robot_time:.0f} s"
+            lines.append(f"{each.experiment}: {time}, at most {most}{ended}")
     lines.append(f"{found.reason} ({found.robot_time:.0f} s of robot time)")
     return "\n".join([*lines, found.closed.text])

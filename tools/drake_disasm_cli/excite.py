@@ -22,9 +22,9 @@ from drake_disasm.cell.parsing import movable_joints
 from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_text
+from drake_disasm.free_motion.arm_limits import CollisionFreeSpace, JointLimits
 from drake_disasm.free_motion.cell_urdf import cell_urdf
 from drake_disasm.scenario import load_scenario
-from sysid.experiment_design.arm_limits import CollisionFreeSpace, JointLimits
 from sysid.experiment_design.design import DesignSettings, design_motion
 from sysid.experiment_design.information import ArmExperiment, arm_effects
 from sysid.experiment_design.output import TABLE, summary, write_design

@@ -22,21 +22,17 @@ from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_text
 from drake_disasm.free_motion.cell_urdf import cell_urdf
 from drake_disasm.free_motion.playing import MotionPlayer
+from drake_disasm.free_motion.recording import URDF, response_header
 from drake_disasm.free_motion.table import read_motion, refuse_beyond_limits
-from drake_disasm.logs import LogHeader, LogWriter, flat_columns
+from drake_disasm.logs import LogWriter, flat_columns
 from drake_disasm.scenario import (
     Scenario,
     load_scenario,
-    scenario_to_mapping,
 )
 from drake_disasm.stations import Station, make_station
 from drake_disasm.visualization import add_cell_view, start_meshcat
 from drake_disasm_cli import common, hardware
 
-_URDF = "arm.urdf"
-#: What is known of the drives: of the simulated ones all, of KUKA's this.
-_SIMULATED = {"gravity_compensation": True, "velocity_feedforward": True}
-_REAL = {"gravity_compensation": True}
 _EXAMPLES = """examples:
   drake-disasm excite --scenario removal --floor 0.05 --out out/motion
                                   a motion that shows friction, off the bench
@@ -135,23 +131,11 @@ def _view(args: argparse.Namespace) -> Callable[..., object] | None:
 def _open_log(
     args: argparse.Namespace, arguments: Sequence[str], scenario: Scenario
 ) -> LogWriter:
-    is_real = args.station == "hardware"
     provenance = program.provenance("drake-disasm play-motion", arguments, 0) | {
         "motion": str(args.motion),
         "hidden": bool(args.hidden),
-        "simulated": not is_real,
-        "station": args.station,
     }
-    header = LogHeader(
-        kind="joint_response",
-        task="free motion",
-        provenance=provenance,
-        period=scenario.arm.control_period,
-        joints=arm_joints(scenario.arm),
-        urdf=str((args.record / _URDF).absolute()),
-        drive=_REAL if is_real else _SIMULATED,
-        scenario=scenario_to_mapping(scenario),
-    )
+    header = response_header(scenario, args.record, args.station, provenance)
     return LogWriter(args.record, header, resume=args.resume)
 
 
@@ -162,6 +146,6 @@ def _keep(writer: LogWriter, player: MotionPlayer, scenario: Scenario) -> None:
         print("log: the motion had not begun; nothing recorded, go on by --resume")
         return
     with writer:
-        write_text(writer.folder / _URDF, cell_urdf(scenario))
+        write_text(writer.folder / URDF, cell_urdf(scenario))
         writer.write_episode(flat_columns("joint_response", columns))
     print(f"log: {writer.folder}")

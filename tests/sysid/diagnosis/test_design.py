@@ -5,19 +5,20 @@ import dataclasses
 import numpy as np
 import pytest
 
-from drake_disasm.common.progress import ignore_progress
 from drake_disasm.effects import GroovePose, SensorBias, SensorDrift, SensorWarmUp
 from drake_disasm.experiments import Presses, Rest, Reversals
 from drake_disasm.scenario import load_scenario
 from sysid.diagnosis.design import mahalanobis, predict
-from sysid.diagnosis.rivals import Need, Rival, best_of_folds
+from sysid.diagnosis.in_contact import twin_forecasts
+from sysid.diagnosis.rivals import Need, TwinRival, best_of_folds
 
 NEED = Need(25.0)
 IMPACT = load_scenario("removal", ["contact.model=impact"])
 
 
-def rival(name: str, *effects: object, **more: object) -> Rival:
-    return Rival(name, dataclasses.replace(IMPACT, effects=list(effects)), 0.5, **more)
+def rival(name: str, *effects: object, **more: object) -> TwinRival:
+    scenario = dataclasses.replace(IMPACT, effects=list(effects))
+    return TwinRival(name, 0.5, 0.0, scenario, **more)
 
 
 def test_a_distance_counts_only_what_parameters_can_not_make_up() -> None:
@@ -44,10 +45,10 @@ def test_a_drift_and_a_settling_reading_are_told_apart_by_waiting() -> None:
         rival("warm-up", SensorWarmUp(fz=1.0, time_constant=10.0)),
     ]
     plans = [Rest(20.0).plan(IMPACT), Presses("z", 2.0, 1).plan(IMPACT)]
-    found = {p.plan.text: p for p in predict(plans, rivals, NEED, ignore_progress)}
+    found = {p.plan.text: p for p in predict(plans, rivals, NEED, twin_forecasts)}
     rest, press = (found[plan.text] for plan in plans)
     assert rest.farthest > press.farthest > 0.0
-    assert rest.channel == 7 and rest.hazard == ""  # z of S is y of G
+    assert rest.forecast.channel == "fy" and rest.hazard == ""  # z of S is y of G
 
 
 def test_what_fits_may_make_up_is_no_difference() -> None:
@@ -58,8 +59,8 @@ def test_what_fits_may_make_up_is_no_difference() -> None:
         for one, other in zip(pair, pair[::-1], strict=True)
     ]
     plans = [Rest(5.0).plan(IMPACT)]
-    [tight] = predict(plans, pair, NEED, ignore_progress)
-    [free] = predict(plans, loose, NEED, ignore_progress)
+    [tight] = predict(plans, pair, NEED, twin_forecasts)
+    [free] = predict(plans, loose, NEED, twin_forecasts)
     assert tight.farthest > 10.0 and free.farthest <= 1.0
     np.testing.assert_allclose(free.bounds, tight.distances)
 
@@ -71,7 +72,7 @@ def test_an_experiment_that_one_rival_makes_dangerous_is_not_performed() -> None
         Reversals(way=0.8, times=1, speed=1.0).plan(IMPACT),
         Rest(1.0).plan(IMPACT),
     ]
-    found = {p.plan.text: p for p in predict(plans, rivals, NEED, ignore_progress)}
+    found = {p.plan.text: p for p in predict(plans, rivals, NEED, twin_forecasts)}
     stroke = found[plans[0].text]
     assert "under turned" in stroke.hazard and stroke.value == 0.0
     assert found[plans[1].text].hazard == ""

@@ -59,7 +59,7 @@ def test_a_second_call_performs_nothing_more(warm) -> None:
     folder, real, first = warm
     again = diagnose(IMPACT, folder, station="twin", real=real, **FEW)
     assert again.robot_time == first.robot_time and again.reason == first.reason
-    with refused("another scenario"):
+    with refused("resume with the same header"):
         diagnose(load_scenario("iiwa_peg"), folder, station="twin")
 
 

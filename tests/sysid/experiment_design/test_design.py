@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid.experiment_design.arm_limits import CollisionFreeSpace, JointLimits
+from drake_disasm.free_motion.arm_limits import CollisionFreeSpace, JointLimits
 from sysid.experiment_design.design import DesignSettings, design_motion
 from sysid.experiment_design.information import (
     ArmExperiment,

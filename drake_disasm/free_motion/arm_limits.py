@@ -18,9 +18,8 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.framework import DiagramBuilder
 
-from drake_disasm.cell.parsing import add_model
+from drake_disasm.cell.parsing import add_model, weld_root
 from drake_disasm.common.errors import DisasmError
-from sysid.models.arm_plant import weld_root
 
 Array = NDArray[np.float64]
 

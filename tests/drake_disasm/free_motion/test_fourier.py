@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid.experiment_design.fourier import FourierMotion
+from drake_disasm.free_motion.fourier import FourierMotion
 
 
 @pytest.fixture

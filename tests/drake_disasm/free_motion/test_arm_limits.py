@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sysid.experiment_design.arm_limits import CollisionFreeSpace, JointLimits
-from sysid.experiment_design.fourier import FourierMotion
+from drake_disasm.free_motion.arm_limits import CollisionFreeSpace, JointLimits
+from drake_disasm.free_motion.fourier import FourierMotion
 from tests.refusals import refused
 from tests.sysid.models.arm import JOINTS, write_two_link_arm
 

@@ -43,6 +43,11 @@ class FourierMotion:
         b = self.b - np.outer(self.b @ k / (k @ k), k)
         return dataclasses.replace(self, a=a, b=b)
 
+    def from_posture(self, q: Array) -> Self:
+        """Returns the motion, moved so that it begins in a posture (joints,)."""
+        w = 2.0 * np.pi * np.arange(1, self.harmonics + 1) / self.duration
+        return dataclasses.replace(self, centre=q + (self.b / w).sum(axis=1))
+
     def scaled(self, factors: Array | float) -> Self:
         """Returns the motion about its centre, times a factor for each joint."""
         by = np.reshape(factors, (-1, 1))

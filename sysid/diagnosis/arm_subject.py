@@ -1,0 +1,145 @@
+"""An arm in free space, as what is diagnosed."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+from drake_disasm.common.progress import Progress, ignore_progress
+from drake_disasm.effects import Effect
+from drake_disasm.experiments import (
+    JointExcitation,
+    JointExperiment,
+    JointPlan,
+    registered_joint_experiments,
+)
+from drake_disasm.free_motion.arm_space import ArmSpace
+from drake_disasm.logs import LogHeader
+from sysid.diagnosis.arm_log import KINDS, Arm, ArmPerformance, GrowingArmLog
+from sysid.diagnosis.design import Prediction, predict
+from sysid.diagnosis.in_free_space import ArmRival, arm_forecasts
+from sysid.diagnosis.loop import DEFAULT_BUDGET, Budget, Confirm, Diagnosis, pursue
+from sysid.diagnosis.rivals import NOTHING, Need, Rival, open_rivals
+from sysid.diagnosis.subject import Subject
+from sysid.effect_selection.close_loop import ClosedLoop
+from sysid.effect_selection.effect_names import short_names
+from sysid.workers import Workers
+
+_WAY = 15.0  # s, to where a motion begins
+
+
+def diagnose_arm(
+    arm: Arm,
+    space: ArmSpace,
+    header: LogHeader,
+    folder: Path,
+    *,
+    kind: str = KINDS[0],
+    budget: Budget = DEFAULT_BUDGET,
+    experiments: Sequence[type[JointExperiment]] | None = None,
+    effects: Sequence[type[Effect]] | None = None,
+    confirm: Confirm = lambda _: True,
+    workers: Workers | None = None,
+    progress: Progress = ignore_progress,
+) -> Diagnosis:
+    """Finds out what the model of an arm lacks, by motions in free space.
+
+    As `diagnose` does in contact. The same call goes on where it was stopped.
+
+    Args:
+        arm: that plays the motions.
+        space: in which.
+        header: of their recordings, of kind `joint_response`: it names the URDF.
+        folder: of recordings, log, fits and `diagnosis.json`.
+        kind: of the log that is judged: joint_motion or joint_response.
+        budget: after which no experiment begins.
+        experiments: to choose from; all registered ones if left out.
+        effects: that may be named; all registered ones if left out.
+        confirm: is asked before each experiment.
+        workers: fit.
+        progress: gets each step.
+
+    Raises:
+        DisasmError: see `diagnose`.
+    """
+    log = GrowingArmLog(arm, space, header, folder, kind, progress)
+    subject = ArmSubject(log, experiments, effects, progress)
+    return pursue(subject, folder, budget, confirm, workers or Workers())
+
+
+class ArmSubject(Subject):
+    """An arm in free space; see `diagnose_arm` for the arguments."""
+
+    def __init__(
+        self,
+        log: GrowingArmLog,
+        experiments: Sequence[type[JointExperiment]] | None,
+        effects: Sequence[type[Effect]] | None,
+        progress: Progress,
+    ) -> None:
+        self.settings = {"kind": log.kind, "joints": list(log.header.joints)}
+        self._log, self._effects, self._progress = log, effects, progress
+        known = registered_joint_experiments()
+        self._kinds = known if experiments is None else experiments
+
+    @property
+    def episodes(self) -> int:
+        """See Subject."""
+        return self._log.episodes
+
+    def first(self) -> list[JointPlan]:
+        """See Subject."""
+        return [JointExcitation().plan(self._log.space)]
+
+    def plans(self) -> list[JointPlan]:
+        """See Subject."""
+        space = self._log.space
+        return [e.plan(space) for kind in self._kinds for e in kind.variants()]
+
+    def most(self, plan: JointPlan) -> float:
+        """See Subject."""
+        return float(plan.motion.time[-1]) + _WAY
+
+    def perform(self, plan: JointPlan) -> ArmPerformance:
+        """See Subject."""
+        return self._log.perform(plan)
+
+    def refuse_hold(self) -> None:
+        """See Subject."""
+        self._log.refuse_hold()
+
+    def verdict(
+        self, workers: Workers, time_budget: float, fits: Path | None
+    ) -> ClosedLoop:
+        """See Subject."""
+        return self._log.verdict(self._effects, workers, time_budget, fits)
+
+    def rivals(
+        self,
+        closed: ClosedLoop,
+        workers: Workers,
+        fits: Path | None,
+        asked: Sequence[tuple[str, ...]],
+    ) -> tuple[Rival, ...]:
+        """See Subject."""
+        model = self._log.model()
+        left = open_rivals(closed, model, ArmRival.of, workers, fits, asked)
+        if left:
+            return left
+        name = short_names(closed.verdict.confirmed) or NOTHING
+        return (ArmRival.of(name, closed.last, 1.0, 0.0),)
+
+    def predict(
+        self,
+        plans: Sequence[JointPlan],
+        rivals: Sequence[Rival],
+        need: Need,
+        trust: Mapping[str, float],
+    ) -> list[Prediction]:
+        """See Subject."""
+        forecasts = partial(
+            arm_forecasts,
+            space=self._log.space,
+            log=self._log.log(),
+            progress=self._progress,
+        )
+        return predict(plans, rivals, need, forecasts, trust)

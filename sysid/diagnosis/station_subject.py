@@ -1,0 +1,102 @@
+"""A station in contact, as what is diagnosed."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+from drake_disasm.common.progress import Progress
+from drake_disasm.effects import Effect
+from drake_disasm.experiments import Experiment, Plan, Removal, registered_experiments
+from drake_disasm.experiments.performing import Performance
+from drake_disasm.scenario import Scenario, scenario_to_mapping
+from sysid.diagnosis.design import Prediction, predict
+from sysid.diagnosis.growing_log import GrowingLog
+from sysid.diagnosis.in_contact import twin_forecasts
+from sysid.diagnosis.rivals import (
+    Need,
+    Rival,
+    open_rivals,
+    twin_rival,
+    unseen_rivals,
+)
+from sysid.diagnosis.subject import Subject
+from sysid.effect_selection.close_loop import ClosedLoop
+from sysid.workers import Workers
+
+FIRST = 3  # removals before the first verdict
+
+
+class StationSubject(Subject):
+    """A station on which the bolt is in contact; see `diagnose` for the arguments."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        log: GrowingLog,
+        experiments: Sequence[type[Experiment]] | None,
+        effects: Sequence[type[Effect]] | None,
+        progress: Progress,
+    ) -> None:
+        self.settings = {"scenario": scenario_to_mapping(scenario)}
+        self._scenario, self._log, self._effects = scenario, log, effects
+        kinds = registered_experiments() if experiments is None else experiments
+        self._kinds, self._progress = kinds, progress
+
+    @property
+    def episodes(self) -> int:
+        """See Subject."""
+        return self._log.episodes
+
+    def first(self) -> list[Plan]:
+        """See Subject."""
+        seeds = [self._log.seed + number for number in range(FIRST)]
+        return [Removal(seed=seed).plan(self._scenario) for seed in seeds]
+
+    def plans(self) -> list[Plan]:
+        """See Subject: all that the scenario has anything to do with."""
+        kinds = [kind for kind in self._kinds if kind is not Removal]
+        plans = [e.plan(self._scenario) for kind in kinds for e in kind.variants()]
+        return [plan for plan in plans if plan.phases]
+
+    def most(self, plan: Plan) -> float:
+        """See Subject."""
+        return plan.most_steps * plan.period
+
+    def perform(self, plan: Plan) -> Performance:
+        """See Subject."""
+        return self._log.perform(plan)
+
+    def refuse_hold(self) -> None:
+        """See Subject."""
+        self._log.refuse_hold()
+
+    def verdict(
+        self, workers: Workers, time_budget: float, fits: Path | None
+    ) -> ClosedLoop:
+        """See Subject."""
+        return self._log.verdict(self._effects, workers, time_budget, fits)
+
+    def rivals(
+        self,
+        closed: ClosedLoop,
+        workers: Workers,
+        fits: Path | None,
+        asked: Sequence[tuple[str, ...]],
+    ) -> tuple[Rival, ...]:
+        """See Subject."""
+        model = self._log.model()
+        left = open_rivals(closed, model, twin_rival, workers, fits, asked)
+        return left or unseen_rivals(closed, self._log, workers, fits)
+
+    def predict(
+        self,
+        plans: Sequence[Plan],
+        rivals: Sequence[Rival],
+        need: Need,
+        trust: Mapping[str, float],
+    ) -> list[Prediction]:
+        """See Subject."""
+        forecasts = partial(
+            twin_forecasts, limits=self._log.limits, progress=self._progress
+        )
+        return predict(plans, rivals, need, forecasts, trust)
