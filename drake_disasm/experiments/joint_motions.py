@@ -10,17 +10,11 @@ from drake_disasm.experiments.registry import register_experiment
 from drake_disasm.free_motion.arm_limits import JointLimits
 from drake_disasm.free_motion.arm_space import ArmSpace
 from drake_disasm.free_motion.fourier import FourierMotion
-from drake_disasm.free_motion.rest_to_rest import (
-    PEAK_ACCELERATION,
-    PEAK_SPEED,
-    shares,
-)
+from drake_disasm.free_motion.rest_to_rest import PERIOD, straight
 from drake_disasm.free_motion.table import MotionTable
 
-_PERIOD = 0.01  # s, of a table
 _HARMONICS = 5
 _SEEDS = (0.0, 1.0, 2.0, 3.0)
-_SPEED = 0.8  # of the greatest, between two rests
 
 
 @register_experiment
@@ -75,15 +69,15 @@ class JointStrokes(JointExperiment):
         limits, times = space.limits, round(self.times)
         speed = self.speed * limits.velocity
         # A reversal is as soft as a mean over so many rows makes it.
-        soft = np.ceil(speed / limits.acceleration / _PERIOD).astype(int)
-        quarter = np.ones(round(self.duration / (4.0 * times) / _PERIOD))
+        soft = np.ceil(speed / limits.acceleration / PERIOD).astype(int)
+        quarter = np.ones(round(self.duration / (4.0 * times) / PERIOD))
         once = np.concatenate([quarter, -quarter, -quarter, quarter])
         sign = np.pad(np.tile(once, times), soft.max() + 1)
         means = [np.ones(2 * n + 1) / (2 * n + 1) for n in soft]
         v = np.stack([np.convolve(sign, mean, "same") for mean in means], axis=1)
-        way = _PERIOD * np.cumsum(speed * v, axis=0)
+        way = PERIOD * np.cumsum(speed * v, axis=0)
         q = space.home + _share_within(limits, space.home, way) * way
-        return MotionTable(_PERIOD * np.arange(len(q)), q)
+        return MotionTable(PERIOD * np.arange(len(q)), q)
 
 
 @register_experiment
@@ -109,28 +103,19 @@ class PostureSteps(JointExperiment):
         size = round(self.postures), len(limits.names)
         anywhere = random.uniform(limits.lower, limits.upper, size)
         drawn = space.home + self.reach * (anywhere - space.home)
-        still = round(self.rest / _PERIOD)
+        still = round(self.rest / PERIOD)
         rows = [space.home[None]]
         for one, other in zip([space.home, *drawn], [*drawn, space.home], strict=True):
-            rows += [_straight(limits, one, other), np.repeat(other[None], still, 0)]
+            rows += [straight(limits, one, other), np.repeat(other[None], still, 0)]
         q = np.concatenate(rows)
-        return MotionTable(_PERIOD * np.arange(len(q)), q)
+        return MotionTable(PERIOD * np.arange(len(q)), q)
 
 
 def _times(duration: float) -> np.ndarray:
-    return _PERIOD * np.arange(round(duration / _PERIOD) + 1)
+    return PERIOD * np.arange(round(duration / PERIOD) + 1)
 
 
 def _share_within(limits: JointLimits, home: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Returns how much of ways (n, joints) from home each joint's range takes."""
     room = np.where(q > 0.0, limits.upper - home, home - limits.lower)
     return np.asarray(np.minimum(1.0, 1.0 / np.max(np.abs(q) / room, axis=0)))
-
-
-def _straight(limits: JointLimits, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Returns a straight way (n, joints) from rest to rest, by a quintic."""
-    away = np.abs(other - one) / _SPEED
-    slowest = np.max(PEAK_SPEED * away / limits.velocity)
-    softest = np.sqrt(np.max(PEAK_ACCELERATION * away / limits.acceleration))
-    rows = max(1, int(np.ceil(max(slowest, softest) / _PERIOD)))
-    return np.asarray(one + shares(rows)[:, None] * (other - one))

@@ -1,6 +1,7 @@
 """An arm in free space, as what is diagnosed."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -15,13 +16,15 @@ from drake_disasm.experiments import (
 from drake_disasm.free_motion.arm_space import ArmSpace
 from drake_disasm.logs import LogHeader
 from sysid.diagnosis.arm_log import KINDS, Arm, ArmPerformance, GrowingArmLog
-from sysid.diagnosis.design import Prediction, predict
+from sysid.diagnosis.design import Prediction, is_enough, predict
 from sysid.diagnosis.in_free_space import ArmRival, arm_forecasts
 from sysid.diagnosis.loop import DEFAULT_BUDGET, Budget, Confirm, Diagnosis, pursue
 from sysid.diagnosis.rivals import NOTHING, Need, Rival, open_rivals
 from sysid.diagnosis.subject import Subject
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.effect_names import short_names
+from sysid.experiment_design.information import arm_effects
+from sysid.experiment_design.separating import SeparatingMotion
 from sysid.workers import Workers
 
 _WAY = 15.0  # s, to where a motion begins
@@ -80,6 +83,7 @@ class ArmSubject(Subject):
         self._log, self._effects, self._progress = log, effects, progress
         known = registered_joint_experiments()
         self._kinds = known if experiments is None else experiments
+        self._performed: set[str] = set()
 
     @property
     def episodes(self) -> int:
@@ -101,6 +105,7 @@ class ArmSubject(Subject):
 
     def perform(self, plan: JointPlan) -> ArmPerformance:
         """See Subject."""
+        self._performed.add(plan.text)
         return self._log.perform(plan)
 
     def refuse_hold(self) -> None:
@@ -142,4 +147,25 @@ class ArmSubject(Subject):
             log=self._log.log(),
             progress=self._progress,
         )
-        return predict(plans, rivals, need, forecasts, trust)
+        found = predict(plans, rivals, need, forecasts, trust)
+        if is_enough(found, rivals, need, math.inf):
+            return found
+        designed = [*self._designed(rivals)]
+        more = [plan for plan in designed if plan.text not in self._performed]
+        found += predict(more, rivals, need, forecasts, trust)
+        return sorted(found, key=lambda each: -each.value)
+
+    def _designed(self, rivals: Sequence[Rival]) -> Iterator[JointPlan]:
+        """Yields the motion that is designed to separate the first two rivals.
+
+        If they differ by one kind of effect each.
+        """
+        one, other = (
+            {type(e.effect).__name__ for e in rival.effects}
+            for rival in rivals[:2]
+            if isinstance(rival, ArmRival)
+        )
+        pair = sorted(one ^ other)
+        if len(one - other) == len(other - one) == 1 and {*pair} <= {*arm_effects()}:
+            motion = SeparatingMotion(pair[0], pair[1], str(self._log.header.urdf))
+            yield motion.plan(self._log.space)

@@ -21,7 +21,7 @@ _JOINTS = tuple(f"iiwa_joint_{i}" for i in range(1, 8))
 def space() -> ArmSpace:
     limits = JointLimits.of_urdf(_IIWA, _JOINTS, 5.0, 0.1)
     collisions = CollisionFreeSpace(_IIWA, _JOINTS, limits, 0.02)
-    return ArmSpace.of(limits, collisions, floor=0.05)
+    return ArmSpace.of(limits, collisions, floor=0.15)
 
 
 @pytest.mark.parametrize(

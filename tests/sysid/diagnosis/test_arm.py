@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drake_disasm.common.progress import ignore_progress
 from drake_disasm.effects import (
     JointCoulombFriction,
     JointStribeckFriction,
@@ -16,6 +17,7 @@ from drake_disasm.experiments import JointExcitation, JointStrokes
 from drake_disasm.logs import read_log
 from drake_disasm.stations.hardware import HoldError
 from sysid.diagnosis import GrowingArmLog, Need, diagnose_arm, predict
+from sysid.diagnosis.arm_subject import ArmSubject
 from sysid.diagnosis.in_free_space import ArmRival, arm_forecasts
 from sysid.fitting.candidates import Candidate
 from sysid.report import diagnosis_page
@@ -103,3 +105,19 @@ def test_rows_before_a_hold_are_kept_and_the_next_call_goes_on(tmp_path: Path) -
     assert half["time"][-1] == pytest.approx(10.0, abs=0.02)
     arm.resume()
     assert told(arm, tmp_path / "out").is_settled
+
+
+def test_a_motion_is_designed_where_the_library_has_none(tmp_path: Path) -> None:
+    """A pendulum of the library's slowest strokes alone, far below the film's speed."""
+    arm = Pendulum(tmp_path, DRY)
+    log = GrowingArmLog(arm, arm.space, arm.header(), tmp_path / "out")
+    log.perform(JointExcitation(5.0).plan(arm.space))
+    base = {p.name: p.nominal for p in log.model().parameters}
+    subject = ArmSubject(log, [], FRICTION, ignore_progress)
+    [designed] = subject.predict([], rivals(**base), Need(25.0), {})
+    assert designed.plan.text.startswith("SeparatingMotion(JointCoulombFriction, ")
+    assert designed.farthest > 5.0 and not designed.hazard
+    ends = designed.plan.motion.q[[0, -1]]
+    np.testing.assert_allclose(ends, [arm.space.home] * 2, atol=1e-4)
+    log.perform(designed.plan)
+    assert log.episodes == 2
