@@ -36,14 +36,14 @@ FLOORS = {
         {"parameters", "confidence", "deadline", "optimise", "thresholds"},
         {"scenario_parameters"},
         {"models"},
-        {"workers", "motor_constants"},
+        {"workers", "motor_constants", "experiment_design"},
         {"objective"},
         {"identification", "data_checks"},
         {"fitting"},
         {"residuals"},
         {"effect_selection"},
         {"export", "acceptance", "diagnosis"},
-        {"validation", "report", "experiment_design", "studies", "monitoring"},
+        {"validation", "report", "studies", "monitoring"},
     ),
 }
 #: What each part of the repository may import of the others.

@@ -88,9 +88,10 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     add(
         "--worlds",
+        nargs="+",
         type=options.positive,
         metavar="N",
-        help="the first N (default: all of the group)",
+        help="the first N, or those from N up to M (default: all of the group)",
     )
     add(
         "--seconds",
@@ -129,12 +130,13 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     for name in args.runner:
         _runner(name)  # an unknown one is refused before hours of work
-    numbers = range(GROUPS[args.group][1])[: args.worlds]
+    numbers = range(GROUPS[args.group][1])[slice(*(args.worlds or [None]))]
     kept = FinishedWork(args.out / "answers")
     found: dict[str, list[Answer]] = {}
     with ProgressBar(unit="world") as progress:
         for name in args.runner:
-            jobs = [_job(args, name, n, found.get(args.seconds_of)) for n in numbers]
+            first = dict(zip(numbers, found.get(args.seconds_of, ()), strict=False))
+            jobs = [_job(args, name, number, first.get(number)) for number in numbers]
             found[name] = _answers(jobs, args.workers, kept, progress)
     worlds = [draw(args.group, number) for number in numbers]
     if args.each:
@@ -149,9 +151,9 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _job(
-    args: argparse.Namespace, name: str, number: int, first: list[Answer] | None
+    args: argparse.Namespace, name: str, number: int, first: Answer | None
 ) -> _Job:
-    seconds = first[number].robot_time if first else args.seconds
+    seconds = first.robot_time if first else args.seconds
     folder = args.out.resolve() / name.replace(":", "_") / f"{args.group}_{number}"
     return _Job(name, args.group, number, seconds, str(folder))
 

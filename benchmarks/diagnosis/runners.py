@@ -1,5 +1,6 @@
 """Runners that the library brings: passive logs, random experiments, and `diagnose`."""
 
+import dataclasses
 import itertools
 import shutil
 from collections.abc import Iterator
@@ -33,7 +34,7 @@ def ours(world: World, folder: Path, seconds: float) -> Answer:
         seed=world.seed,
     )
     performed = [each for each in found.rounds if each.experiment]
-    return Answer.of(
+    answer = Answer.of(
         found.closed,
         robot_time=found.robot_time,
         experiments=tuple(each.experiment for each in performed),
@@ -41,6 +42,9 @@ def ours(world: World, folder: Path, seconds: float) -> Answer:
         torque=max((each.torque for each in performed), default=0.0),
         cut_short=tuple(each.ended for each in performed if each.ended),
     )
+    if found.is_refuted:
+        return dataclasses.replace(answer, names=(), open=(), is_unknown=True)
+    return answer
 
 
 def passive(world: World, folder: Path, seconds: float) -> Answer:

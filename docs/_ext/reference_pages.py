@@ -21,7 +21,11 @@ from drake_disasm_cli.main import COMMANDS
 from drake_disasm.common.files import write_text
 from drake_disasm.effects import registered_effects
 from drake_disasm.effects.documentation import documentation
-from drake_disasm.experiments import registered_experiments
+from drake_disasm.experiments import (
+    FREE_SPACE,
+    registered_experiments,
+    registered_joint_experiments,
+)
 from drake_disasm.learning.hyperparameters import Hyperparameters
 from drake_disasm.parts import registered_parts
 from drake_disasm.scenario.schema import Scenario
@@ -108,12 +112,12 @@ def effects() -> str:
 
 def _experiments() -> Iterator[str]:
     """Yields the experiments of the library, each as a section."""
-    for kind in registered_experiments():
+    for kind in (*registered_experiments(), *registered_joint_experiments()):
         if kind.__module__.startswith("drake_disasm."):
             text = inspect.getdoc(kind) or ""
             yield from (f"## {kind.__name__}", "", text, "")
-            if kind.needs:
-                yield from (f"Needs {kind.needs}.", "")
+            if needs := getattr(kind, "needs", FREE_SPACE):
+                yield from (f"Needs {needs}.", "")
             rows = [
                 (*row[:-1], row[-1] + _tried(field))
                 for row, field in zip(

@@ -16,6 +16,7 @@ from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.effect_names import short_names
 from sysid.workers import Workers
 
+_REFUTED = 3  # verdicts, until none of the library is believed
 _TRUST = 0.5  # in what another experiment of the same class would separate
 
 #: Is asked before each experiment, with what it is; False ends the diagnosis.
@@ -86,6 +87,7 @@ class Diagnosis:
         first_time: robot time before the first verdict [s].
         predictions: of the last round's experiments, the best first.
         rivals: of the last round.
+        is_refuted: whether no name stands: experiments refuted one after the other.
     """
 
     rounds: tuple[Round, ...]
@@ -94,16 +96,18 @@ class Diagnosis:
     first_time: float
     predictions: tuple[Prediction, ...]
     rivals: tuple[Rival, ...]
+    is_refuted: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Effects that the last verdict confirms."""
-        return self.closed.verdict.confirmed
+        """Effects that the last verdict confirms, if names stand."""
+        return () if self.is_refuted else self.closed.verdict.confirmed
 
     @property
     def is_settled(self) -> bool:
         """Whether one hypothesis is left, guesses apart."""
-        return sum(not rival.is_guess for rival in self.rivals) == 1
+        left = sum(not rival.is_guess for rival in self.rivals)
+        return left == 1 and not self.is_refuted
 
     @property
     def robot_time(self) -> float:
@@ -142,6 +146,9 @@ def pursue(
         predictions = session.predict(plans, rivals, need)
         left = budget.robot - session.robot_time
         best, reason = _choice(closed, rivals, predictions, need, left)
+        refuted = session.refuted(closed)
+        if len(refuted) >= _REFUTED:
+            best, reason = None, _no_name_stands(refuted)
         if best is not None and not confirm(_question(best)):
             best, reason = None, "stopped by hand; the same command goes on from here"
         if best is None:
@@ -153,6 +160,7 @@ def pursue(
                 session.first_time,
                 tuple(predictions),
                 rivals,
+                len(refuted) >= _REFUTED,
             )
         session.experiment(closed, rivals, best)
 
@@ -196,6 +204,14 @@ def _settled(closed: ClosedLoop) -> str:
     if closed.verdict.ending == "partly":
         names += ", and something that is not in the library"
     return f"settled: the model lacks {names}"
+
+
+def _no_name_stands(refuted: Sequence[str]) -> str:
+    """Returns that experiments refuted one name after the other."""
+    return (
+        f"no name stands: experiments refuted {'; '.join(refuted)}, one after the "
+        "other; what the model lacks is not in the library"
+    )
 
 
 def _first_two(rivals: Sequence[Rival]) -> str:
@@ -262,6 +278,19 @@ class _Session:
             self.first_time += subject.perform(plan).duration
             self._write("")
             subject.refuse_hold()
+
+    def refuted(self, closed: ClosedLoop) -> list[str]:
+        """Returns names of verdicts after whose experiment something else was named.
+
+        That was not among their rivals either.
+        """
+        named = [*(each.names for each in self.rounds), closed.verdict.names]
+        return [
+            short_names(each.names)
+            for each, new in zip(self.rounds, named[1:], strict=True)
+            if each.names and set(new) != set(each.names)
+            if (short_names(new) or NOTHING) not in each.rivals
+        ]
 
     def predict(
         self, plans: Sequence[Any], rivals: Sequence[Rival], need: Need
