@@ -146,7 +146,7 @@ def pursue(
         predictions = session.predict(plans, rivals, need)
         left = budget.robot - session.robot_time
         best, reason = _choice(closed, rivals, predictions, need, left)
-        refuted = session.refuted(closed)
+        refuted = refuted_names(session.rounds, closed.verdict.names)
         if len(refuted) >= _REFUTED:
             best, reason = None, _no_name_stands(refuted)
         if best is not None and not confirm(_question(best)):
@@ -204,6 +204,24 @@ def _settled(closed: ClosedLoop) -> str:
     if closed.verdict.ending == "partly":
         names += ", and something that is not in the library"
     return f"settled: the model lacks {names}"
+
+
+def refuted_names(rounds: Sequence[Round], names: Sequence[str]) -> tuple[str, ...]:
+    """Returns what verdicts named, before an experiment that spoke for something else.
+
+    For what was not among their rivals either.
+
+    Args:
+        rounds: that ended with an experiment.
+        names: of the verdict after the last.
+    """
+    named = [*(each.names for each in rounds), names]
+    return tuple(
+        short_names(each.names)
+        for each, new in zip(rounds, named[1:], strict=True)
+        if each.names and set(new) != set(each.names)
+        if (short_names(new) or NOTHING) not in each.rivals
+    )
 
 
 def _no_name_stands(refuted: Sequence[str]) -> str:
@@ -278,19 +296,6 @@ class _Session:
             self.first_time += subject.perform(plan).duration
             self._write("")
             subject.refuse_hold()
-
-    def refuted(self, closed: ClosedLoop) -> list[str]:
-        """Returns names of verdicts after whose experiment something else was named.
-
-        That was not among their rivals either.
-        """
-        named = [*(each.names for each in self.rounds), closed.verdict.names]
-        return [
-            short_names(each.names)
-            for each, new in zip(self.rounds, named[1:], strict=True)
-            if each.names and set(new) != set(each.names)
-            if (short_names(new) or NOTHING) not in each.rivals
-        ]
 
     def predict(
         self, plans: Sequence[Any], rivals: Sequence[Rival], need: Need

@@ -3,6 +3,7 @@
 import abc
 import dataclasses
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Self
@@ -257,15 +258,22 @@ def _start(fit: Fit, effects: Sequence[Candidate]) -> Fit | None:
 
 
 def _ambiguous_sets(closed: ClosedLoop, library: Sequence[Candidate]) -> Iterator[_Set]:
-    """Yields sets of effects that are left, the verdict's first."""
-    chosen = closed.last.effects
+    """Yields sets of effects that are left, the verdict's first.
+
+    One rival of a kind at several joints replaces it at all of them.
+    """
+    chosen, together = closed.last.effects, defaultdict(list)
     yield _Set(chosen)
     for standing in closed.verdict.standings:
-        rest = tuple(e for e in chosen if e.name != standing.name)
         if standing.status == "suggested":
+            rest = tuple(e for e in chosen if e.name != standing.name)
             yield _Set(rest, is_equal=False)
+        kind = standing.name.partition(".")[0]
         for names in standing.rivals:
-            yield _Set((*rest, *(_shaped(closed, name, library) for name in names)))
+            together[kind, names].append(standing.name)
+    for (_, names), replaced in together.items():
+        rest = tuple(e for e in chosen if e.name not in replaced)
+        yield _Set((*rest, *(_shaped(closed, name, library) for name in names)))
 
 
 def _shaped(closed: ClosedLoop, name: str, library: Sequence[Candidate]) -> Candidate:

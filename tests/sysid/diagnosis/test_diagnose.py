@@ -10,7 +10,8 @@ from drake_disasm.effects import SensorDrift, SensorGain, SensorWarmUp
 from drake_disasm.experiments import Presses, Rest, Reversals
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
-from sysid.diagnosis import NOTHING, Budget, diagnose
+from sysid.diagnosis import NOTHING, Budget, Round, diagnose
+from sysid.diagnosis.loop import refuted_names
 from sysid.report import diagnosis_page
 from tests.refusals import refused
 
@@ -38,12 +39,25 @@ def test_it_ends_with_what_is_hidden(warm) -> None:
     assert found.is_settled and found.names == ("SensorWarmUp",)
     assert found.reason == "settled: the model lacks SensorWarmUp"
     assert found.robot_time < 300.0
+    assert found.rounds[-2].names == found.names  # it stood once
     episodes = read_log(folder / "log").episodes
     performed = [each for each in found.rounds if each.experiment]
     assert len(episodes) == 3 + len(performed)
     for each in performed:
         assert each.force < 14.0 and each.distance >= 5.0 and len(each.rivals) > 1
         assert set(each.predicted) == set(each.rivals)
+
+
+def test_names_are_refuted_by_what_was_no_rival_of_theirs() -> None:
+    one = Round("", ("A",), {"A": 0.9, "B": 0.1})
+    assert refuted_names([one], ("A",)) == ()
+    assert refuted_names([one], ("B",)) == ()
+    assert refuted_names([one], ("C",)) == ("A",)
+    nothing = Round("", (), {"nothing": 1.0})
+    assert refuted_names([nothing], ("A",)) == ()
+    two = Round("", ("B", "C"), {"B": 0.5, "nothing": 0.5})
+    assert refuted_names([one, two], ()) == ("A",)
+    assert refuted_names([one, two], ("D",)) == ("A", "B and C")
 
 
 def test_the_report_tells_the_story(warm) -> None:
