@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+RECORDED := build/recorded/diagnosis/report.html
 ARGS ?=
 PYTEST := $(BIN)/python -m pytest -n 2 --dist worksteal
 PIP := $(BIN)/python -m pip install --quiet --constraint constraints.txt
@@ -39,9 +40,13 @@ format: $(VENV)/.dev  ## Put the code in shape
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-docs: check-libraries $(VENV)/.docs  ## Build the site: build/docs/index.html
+docs: check-libraries $(VENV)/.docs $(RECORDED)  ## Build the site: build/docs/index.html
 	$(BIN)/python -m sphinx -q -W --keep-going -j auto -d build/doctrees docs build/docs
 	@echo "build/docs/index.html"
+
+$(RECORDED): | check-libraries $(VENV)/.docs
+	rm -rf $(@D)
+	$(BIN)/python docs/_ext/recorded_diagnosis.py $(@D)
 
 reference: check-libraries $(VENV)/.dev  ## Write the pages of docs/reference that the code makes
 	$(BIN)/python docs/_ext/reference_pages.py

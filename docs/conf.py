@@ -67,6 +67,8 @@ autodoc_inherit_docstrings = False
 html_theme = "pydata_sphinx_theme"
 html_title = "drake_disasm"
 html_static_path = ["_static"]
+# Recorded by `make docs`, which is too large to be kept.
+html_extra_path = [str(path) for path in [ROOT / "build" / "recorded"] if path.exists()]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_copy_source = False
