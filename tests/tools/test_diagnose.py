@@ -7,6 +7,7 @@ import pytest
 from tests.tools.programs import run_program
 
 _TWIN = ("--set", "contact.model=impact", "--station", "twin")
+_ARM = ("--kind", "joint_motion")
 
 
 @pytest.mark.parametrize(
@@ -18,6 +19,11 @@ _TWIN = ("--set", "contact.model=impact", "--station", "twin")
         (["--station", "hardware", "--yes"], "--hardware-config"),
         (["--hidden", "nowhere", "--yes"], "nowhere"),
         (_TWIN, "give --yes"),
+        ([*_ARM, "--station", "twin"], "no arm to move"),
+        ([*_ARM, "--html"], "--html: an arm in free space has none"),
+        ([*_ARM, "--experiments", "Presses"], "Presses: not for --kind joint_motion"),
+        (["--experiments", "JointStrokes"], "not for --kind transitions"),
+        (_ARM, "give --yes"),
     ],
 )
 def test_bad_input_is_one_line(arguments, message, tmp_path, monkeypatch):
