@@ -273,7 +273,8 @@ def _ambiguous_sets(closed: ClosedLoop, library: Sequence[Candidate]) -> Iterato
             together[kind, names].append(standing.name)
     for (_, names), replaced in together.items():
         rest = tuple(e for e in chosen if e.name not in replaced)
-        yield _Set((*rest, *(_shaped(closed, name, library) for name in names)))
+        new = [name for name in names if name not in [e.name for e in rest]]
+        yield _Set((*rest, *(_shaped(closed, name, library) for name in new)))
 
 
 def _shaped(closed: ClosedLoop, name: str, library: Sequence[Candidate]) -> Candidate:
