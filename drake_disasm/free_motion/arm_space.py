@@ -1,6 +1,7 @@
 """Where an arm may go, and the posture in which its motions begin and end."""
 
 import dataclasses
+from collections.abc import Callable
 from typing import Self
 
 import numpy as np
@@ -13,11 +14,15 @@ from drake_disasm.free_motion.table import MotionTable
 Array = NDArray[np.float64]
 
 _POSTURES = 300  # random ones, of which the roomiest is home
-_CLEAR = 1.5  # times the clearance that is asked for: so is this
-_CENTRAL = 0.5  # of half a joint's range: so far from its ends is enough
+_ABOUT = 0.4  # of half a joint's range: how far from home room is looked for
+_NEAR = 20  # postures there
 _EVERY = 0.05  # s, of a motion, at which postures are looked at
 _ON_THE_WAY = 20  # postures on a straight way
 _SHRINKS = 8  # halvings of the step in which a motion is made to fit
+
+
+def _anything(_: Array) -> bool:
+    return True
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,6 +35,7 @@ class ArmSpace:
         home: (joints,) in which motions begin and end.
         clearance: of links from each other, at least [m].
         floor: height that no moving link's origin may be below [m]; None: any.
+        is_allowed: whether all of some postures (n, joints) keep to what else holds.
     """
 
     limits: JointLimits
@@ -37,6 +43,7 @@ class ArmSpace:
     home: Array
     clearance: float = 0.02
     floor: float | None = None
+    is_allowed: Callable[[Array], bool] = _anything
 
     @classmethod
     def of(
@@ -46,24 +53,27 @@ class ArmSpace:
         clearance: float = 0.02,
         floor: float | None = None,
         start: Array | None = None,
+        is_allowed: Callable[[Array], bool] = _anything,
     ) -> Self:
         """Returns the space, with the roomiest posture of some random ones as home.
 
         Args:
-            limits, collisions, clearance, floor: see the attributes.
+            limits, collisions, clearance, floor, is_allowed: see the attributes.
             start: (joints,) from where the straight way there has to be free.
 
         Raises:
             DisasmError: no posture will do.
         """
         random = np.random.default_rng(0)
-        drawn = random.uniform(
-            limits.lower, limits.upper, (_POSTURES, len(limits.names))
-        )
-        spaces = [cls(limits, collisions, q, clearance, floor) for q in drawn]
-        for space in sorted(spaces, key=lambda each: -each.room):
-            if not space.is_free(space.home[None]):
-                continue
+        size = _POSTURES, len(limits.names)
+        drawn = random.uniform(limits.lower, limits.upper, size)
+        if start is not None:
+            near = 0.5 * _ABOUT * (limits.upper - limits.lower)
+            drawn[::2] = start + near * random.uniform(-1.0, 1.0, size)[::2]
+        rest = clearance, floor, is_allowed
+        spaces = [cls(limits, collisions, home, *rest) for home in drawn]
+        free = [space for space in spaces if space.is_free(space.home[None])]
+        for space in sorted(free, key=lambda each: each.room, reverse=True):
             if start is None or space.is_clear(_between(start, space.home), 0.0):
                 return space
         raise DisasmError(
@@ -71,17 +81,16 @@ class ArmSpace:
         )
 
     @property
-    def room(self) -> float:
-        """How much of it is about home: 1 for enough."""
-        limits, collisions = self.limits, self.collisions
+    def room(self) -> tuple[float, float]:
+        """Share of some postures about home that is free, and how central home is."""
+        random, limits = np.random.default_rng(0), self.limits
         half = 0.5 * (limits.upper - limits.lower)
+        about = self.home + _ABOUT * half * random.uniform(
+            -1.0, 1.0, (_NEAR, len(half))
+        )
         least = np.minimum(self.home - limits.lower, limits.upper - self.home)
-        found = float(np.min(least / half)) / _CENTRAL
-        if collisions.has_geometry:
-            most = _CLEAR * self.clearance
-            clear = collisions.clearance(self.home[None], most)
-            found = min(found, float(clear[0]) / most)
-        return min(found, 1.0)
+        free = np.mean([self.is_free(q[None]) for q in about])
+        return float(free), float(np.min(least / half))
 
     def is_free(self, q: Array) -> bool:
         """Returns whether postures (n, joints) may all be taken."""
@@ -89,13 +98,15 @@ class ArmSpace:
         return bool(within.all()) and self.is_clear(q, self.clearance)
 
     def is_clear(self, q: Array, least: float) -> bool:
-        """Returns whether links keep their distance in postures (n, joints).
+        """Returns whether links keep off whatever is there in postures (n, joints).
 
         Args:
             q: the postures, within the joints' limits or not.
             least: distance of links from each other [m].
         """
         collisions = self.collisions
+        if not self.is_allowed(q):
+            return False
         if self.floor is not None and collisions.height(q).min() < self.floor:
             return False
         if not collisions.has_geometry:

@@ -5,6 +5,7 @@ import dataclasses
 import math
 import shutil
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -33,7 +34,8 @@ from drake_disasm.logs.importing import (
 )
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations import Station
-from drake_disasm.stations.hardware import HoldError
+from drake_disasm.stations.hardware import HardwareStation, HoldError
+from sysid.diagnosis.in_contact import is_within
 from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.models.base import Array, LogModel
 from sysid.models.from_logs import ModelChoice, model_of
@@ -115,11 +117,22 @@ def arm_of_station(
     write_text(Path(urdf), cell_urdf(scenario))
     limits = JointLimits.of_urdf(urdf, station.joints, _ACCELERATION, _MARGIN)
     collisions = CollisionFreeSpace(urdf, station.joints, limits, _CLEARANCE)
-    start = way_out(station)[-1]
-    space = ArmSpace.of(limits, collisions, _CLEARANCE, _FLOOR, start)
+    start, is_allowed = way_out(station)[-1], partial(_is_allowed, station)
+    if isinstance(station, HardwareStation):
+        share = (1.0 - _MARGIN) * station.config.safety.velocity_share
+        limits = dataclasses.replace(limits, velocity=share * limits.velocity)
+    space = ArmSpace.of(limits, collisions, _CLEARANCE, _FLOOR, start, is_allowed)
     provenance = {"program": "diagnose"}
     header = response_header(scenario, folder, station.kind, provenance)
     return StationArm(station), space, header
+
+
+def _is_allowed(station: Station, q: Array) -> bool:
+    """Returns whether hardware's workspace has the bolt in postures (n, joints)."""
+    if not isinstance(station, HardwareStation):
+        return True
+    p = np.array([station.coordinates.pose(one).translation() for one in q])
+    return is_within(station.config.safety, p)
 
 
 @dataclasses.dataclass(frozen=True)

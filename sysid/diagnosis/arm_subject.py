@@ -46,7 +46,13 @@ def diagnose_arm(
 ) -> Diagnosis:
     """Finds out what the model of an arm lacks, by motions in free space.
 
-    As `diagnose` does in contact. The same call goes on where it was stopped.
+    As `diagnose` does in contact. The same call goes on where it was stopped. Of your
+    own robot:
+
+        limits = JointLimits.of_urdf(urdf, joints, acceleration=5.0, margin=0.1)
+        space = ArmSpace.of(limits, CollisionFreeSpace(urdf, joints, limits, 0.02))
+        header = LogHeader("joint_response", "swing", {}, urdf=urdf, joints=joints)
+        diagnose_arm(robot, space, header, Path("out/arm"))
 
     Args:
         arm: that plays the motions.

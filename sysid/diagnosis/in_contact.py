@@ -150,7 +150,7 @@ def _hazard(
                 f"under {rival.name} it presses by {force:.1f} N and {torque:.2f} N m, "
                 f"above {100 * _MARGIN:.0f} % of what is allowed"
             )
-        if limits and not _is_within(limits, each.observations[:, :3]):
+        if limits and not is_within(limits, each.observations[:, :3]):
             return (
                 f"under {rival.name} it comes near the sides of the workspace; see "
                 "safety.workspace_*"
@@ -160,7 +160,7 @@ def _hazard(
     return ""
 
 
-def _is_within(limits: SafetyConfig, path: Array) -> bool:
+def is_within(limits: SafetyConfig, path: Array) -> bool:
     """Returns whether a path (n, 3) keeps off the workspace's sides, twice as far."""
     margin = 2.0 * limits.workspace_margin
     low = np.array(limits.workspace_low) + margin

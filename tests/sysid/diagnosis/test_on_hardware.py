@@ -3,17 +3,19 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from drake_disasm.effects import SensorDrift, SensorMounting, SensorWarmUp
-from drake_disasm.experiments import Presses, Rest
+from drake_disasm.experiments import JointExcitation, JointStrokes, Presses, Rest
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import load_scenario
 from drake_disasm.stations.fake_cell.lockstep import FakeHardware, fake_hardware
-from sysid.diagnosis import Diagnosis, diagnose
+from sysid.diagnosis import Diagnosis, GrowingArmLog, arm_of_station, diagnose
 from tests.refusals import refused
 
 MODEL = load_scenario("removal", ["contact.model=impact"])
+WIDE = {"workspace_low": [-0.5] * 3, "workspace_high": [0.5] * 3}
 EFFECTS = (SensorDrift, SensorWarmUp, SensorMounting)
 
 
@@ -50,6 +52,22 @@ def test_it_ends_with_what_the_cell_hides(effect, tmp_path) -> None:
         found = _diagnose(fake, tmp_path)
     assert found.names == tuple(type(each).__name__ for each in hidden)
     assert not found.closed.verdict.ambiguous
+
+
+@pytest.mark.slow
+def test_an_arm_moves_within_the_limits_that_hold_hardware(tmp_path) -> None:
+    """Its workspace lets the bolt out of the part, and its joints move a quarter."""
+    with fake_hardware("removal", limits=WIDE) as fake:
+        arm, space, header = arm_of_station(
+            fake.station, fake.station.scenario, tmp_path
+        )
+        log = GrowingArmLog(arm, space, header, tmp_path)
+        for experiment in (JointExcitation(10.0), JointStrokes(0.1, 6.0, 1)):
+            plan = experiment.plan(space)
+            assert np.ptp(plan.motion.q, axis=0).max() > 0.05
+            assert log.perform(plan).ended == ""
+            log.refuse_hold()
+    assert log.episodes == 2
 
 
 def test_a_hold_keeps_the_rows_and_the_next_start_goes_on(tmp_path) -> None:
