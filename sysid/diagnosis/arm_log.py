@@ -144,12 +144,14 @@ class ArmPerformance:
         torque: greatest of any joint [N m].
         duration: robot time [s].
         ended: why it was cut short; empty if it was performed whole.
+        period: of rows [s].
     """
 
     measured: Mapping[str, Array]
     torque: float
     duration: float
     ended: str
+    period: float
 
     @property
     def greatest(self) -> tuple[float, float]:
@@ -214,7 +216,8 @@ class GrowingArmLog:
         values = columns["tau" if self.kind == "joint_motion" else "q"]
         measured = dict(zip(self.header.joints, values.T, strict=True))
         torque = float(np.abs(columns["tau"]).max(initial=0.0))
-        return ArmPerformance(measured, torque, duration, ended)
+        period = float(self.header.period or 0.0)
+        return ArmPerformance(measured, torque, duration, ended, period)
 
     def verdict(
         self,

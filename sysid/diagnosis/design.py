@@ -53,6 +53,7 @@ class Forecast:
         channel: in which rivals differ most, with its unit.
         unit: of that.
         shown: of each rival (n,) in that channel.
+        period: of its rows [s].
         hazard: why it is not performed, in words; empty if it may be.
     """
 
@@ -64,6 +65,7 @@ class Forecast:
     channel: str
     unit: str
     shown: Sequence[Array]
+    period: float
     hazard: str
 
 

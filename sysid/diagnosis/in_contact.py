@@ -81,6 +81,7 @@ def twin_forecasts(
                 STATE_NAMES[i],
                 STATE_UNITS[i],
                 [own[0][:, i] for own in same],
+                plan.period,
                 _hazard(done, rivals, reach, limits),
             )
         )

@@ -121,6 +121,7 @@ def arm_forecasts(
                 joints[i],
                 channel.unit,
                 [own[:, i] for own in first],
+                _period(log),
                 _hazard(plan, torques, rivals, space),
             )
         )
@@ -189,10 +190,14 @@ def _imagined_response(log: Log, motion: MotionTable, first: ArmRival) -> LogMod
 
 def _rows(log: Log, motion: MotionTable) -> Array:
     """Returns times of rows that are as far apart as the log's [s]."""
-    time = log.episodes[0]["time"]
-    period = float(np.median(np.diff(time)))
+    period = _period(log)
     rows = int(motion.time[-1] / period) + 1
     return np.asarray(period * np.arange(rows), dtype=np.float64)
+
+
+def _period(log: Log) -> float:
+    """Returns how far apart a log's rows are [s]."""
+    return float(np.median(np.diff(log.episodes[0]["time"])))
 
 
 def _with_episode(log: Log, columns: Mapping[str, Array]) -> Log:

@@ -58,6 +58,7 @@ class Round:
         unit: of that channel.
         predicted: by each rival, in that channel, by name, step by step (n + 1,).
         measured: (m + 1,) in that channel.
+        periods: of rows that were predicted, and measured [s].
     """
 
     verdict: str
@@ -74,6 +75,7 @@ class Round:
     unit: str = ""
     predicted: dict[str, list[float]] = dataclasses.field(default_factory=dict)
     measured: list[float] = dataclasses.field(default_factory=list)
+    periods: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -335,6 +337,7 @@ class _Session:
                 unit=forecast.unit,
                 predicted={rival.name: shown.tolist() for rival, shown in pairs},
                 measured=found.channel(forecast.channel).tolist(),
+                periods=(forecast.period, found.period),
             )
         )
         self._write("")

@@ -28,6 +28,10 @@ class Performed(Protocol):
     def ended(self) -> str:
         """Why it was cut short; empty if it was performed whole."""
 
+    @property
+    def period(self) -> float:
+        """Of rows that were measured [s]."""
+
     def channel(self, name: str) -> np.ndarray:
         """Returns what was measured in a channel (n,)."""
 

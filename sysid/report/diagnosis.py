@@ -35,13 +35,13 @@ def diagnosis_page(
 
 def experiment_plot(one: Round) -> Plot:
     """Returns what each rival predicted of an experiment, and what was measured."""
-    figure, period = go.Figure(), one.robot_time / max(1, len(one.measured) - 1)
+    figure, (predicted, measured) = go.Figure(), one.periods
     for name, values in one.predicted.items():
-        figure.add_trace(go.Scatter(y=values, dx=period, mode="lines", name=name))
+        figure.add_trace(go.Scatter(y=values, dx=predicted, mode="lines", name=name))
     figure.add_trace(
         go.Scatter(
             y=one.measured,
-            dx=period,
+            dx=measured,
             mode="markers",
             marker={"color": MEASURED, "size": 4},
             name="measured",
