@@ -1,6 +1,6 @@
-"""Records a diagnosis to be looked at: its report, and a Meshcat page of each experiment.
+"""Records a diagnosis: its report, and a Meshcat page of each experiment.
 
-A simulated cell whose sensor warms up, asked by three experiments about three effects.
+A simulated cell whose sensor warms up, asked by two experiments about two effects.
 `make docs` runs it, once: `python docs/_ext/recorded_diagnosis.py FOLDER`.
 """
 
@@ -12,8 +12,8 @@ from pathlib import Path
 
 from drake_disasm.common.files import make_folder, write_text
 from drake_disasm.common.program import provenance
-from drake_disasm.effects import SensorDrift, SensorGain, SensorWarmUp
-from drake_disasm.experiments import Presses, Rest, Reversals
+from drake_disasm.effects import SensorDrift, SensorWarmUp
+from drake_disasm.experiments import Presses, Rest
 from drake_disasm.scenario import load_scenario
 from drake_disasm.visualization import MeshcatView, start_meshcat
 from sysid.diagnosis import diagnose
@@ -25,7 +25,7 @@ def main(folder: Path) -> None:
     with tempfile.TemporaryDirectory() as name:
         _diagnose(Path(name))
         make_folder(folder)
-        for own in ("meshcat", "report.html"):  # by the last, make knows that it is done
+        for own in ("meshcat", "report.html"):  # the last is what make looks for
             shutil.move(Path(name) / own, folder / own)
 
 
@@ -38,8 +38,8 @@ def _diagnose(folder: Path) -> None:
         model,
         folder,
         real=real,
-        experiments=(Presses, Reversals, Rest),
-        effects=(SensorDrift, SensorGain, SensorWarmUp),
+        experiments=(Presses, Rest),
+        effects=(SensorDrift, SensorWarmUp),
         view=MeshcatView(start_meshcat(), record=True),
     )
     origin = provenance("docs/_ext/recorded_diagnosis.py", sys.argv[1:], 0)

@@ -191,17 +191,19 @@ def _open_sets(
 ) -> Iterator[_Set]:
     """Yields sets of effects among which a verdict leaves the choice.
 
-    What few seconds of contact show may be gone with the next: a single name has to
-    stand once after an experiment that was made to refute it, and a residual that
-    nothing explains is asked about more often.
+    What few seconds of contact show may be gone with the next: names have to stand once
+    after an experiment that was made to refute them, and a residual that nothing
+    explains is asked about more often.
     """
-    verdict, count = closed.verdict, len(closed.verdict.confirmed)
+    verdict = closed.verdict
     is_left = verdict.ending in ("unexplained", "partly") and len(asked) < _TRIED
-    is_single = count == 1 and closed.last.model.makes_contact
-    is_new = not asked or set(asked[-1]) != set(verdict.names)
+    has_to_stand = not asked or set(asked[-1]) != set(verdict.names)
+    is_short = closed.last.model.makes_contact
     if verdict.ambiguous or verdict.suggested:
         yield from _ambiguous_sets(closed, library)
-    elif (not count and is_left) or (is_single and (is_left or is_new)):
+    elif not verdict.confirmed:
+        yield from _suspects(closed, library) if is_left else ()
+    elif is_short and (is_left or has_to_stand):
         yield from _suspects(closed, library)
 
 
@@ -287,9 +289,11 @@ def _shaped(closed: ClosedLoop, name: str, library: Sequence[Candidate]) -> Cand
 
 
 def _suspects(closed: ClosedLoop, library: Sequence[Candidate]) -> Iterator[_Set]:
-    """Yields the verdict, and what else explains most of the residual by itself."""
+    """Yields the verdict, less each of several, and what else explains most alone."""
     chosen = closed.last.effects
     yield _Set(chosen, is_equal=bool(chosen))
+    for number in range(len(chosen)) if len(chosen) > 1 else ():
+        yield _Set((*chosen[:number], *chosen[number + 1 :]), is_guess=True)
     names = dict.fromkeys(gain.term.names for gain in closed.search.begin)
     single = [own[0] for own in names if len(own) == 1]
     others = [name for name in single if name not in [e.name for e in chosen]]
