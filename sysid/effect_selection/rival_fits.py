@@ -36,7 +36,11 @@ def judged_by_all_rows(
         kept = []
         for rival in step.rivals:
             if time.monotonic() < deadline:
-                more = tuple(Candidate.of(c.effect) for c in rival.term.candidates)
+                rest = {e.name for e in others}
+                own = [c for c in rival.term.candidates if c.name not in rest]
+                if not own:  # the model has it already, and that was not enough
+                    continue
+                more = tuple(Candidate.of(c.effect) for c in own)
                 gain = _gain(rival, without, fitter.fit((*others, *more), without))
                 if not gain.is_ambiguous_with(chosen, fitter.settings):
                     continue
