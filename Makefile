@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+# A diagnosis that the site shows; empty for a site without it.
 RECORDED := build/recorded/diagnosis/report.html
 ARGS ?=
 PYTEST := $(BIN)/python -m pytest -n 2 --dist worksteal
@@ -44,9 +45,11 @@ docs: check-libraries $(VENV)/.docs $(RECORDED)  ## Build the site: build/docs/i
 	$(BIN)/python -m sphinx -q -W --keep-going -j auto -d build/doctrees docs build/docs
 	@echo "build/docs/index.html"
 
+ifneq ($(RECORDED),)
 $(RECORDED): | check-libraries $(VENV)/.docs
 	rm -rf $(@D)
 	$(BIN)/python docs/_ext/recorded_diagnosis.py $(@D)
+endif
 
 reference: check-libraries $(VENV)/.dev  ## Write the pages of docs/reference that the code makes
 	$(BIN)/python docs/_ext/reference_pages.py
