@@ -21,10 +21,6 @@ _ON_THE_WAY = 20  # postures on a straight way
 _SHRINKS = 8  # halvings of the step in which a motion is made to fit
 
 
-def _anything(_: Array) -> bool:
-    return True
-
-
 @dataclasses.dataclass(frozen=True)
 class ArmSpace:
     """Where an arm may go: within its limits, clear of itself and of the floor.
@@ -43,7 +39,7 @@ class ArmSpace:
     home: Array
     clearance: float = 0.02
     floor: float | None = None
-    is_allowed: Callable[[Array], bool] = _anything
+    is_allowed: Callable[[Array], bool] | None = None
 
     @classmethod
     def of(
@@ -53,7 +49,7 @@ class ArmSpace:
         clearance: float = 0.02,
         floor: float | None = None,
         start: Array | None = None,
-        is_allowed: Callable[[Array], bool] = _anything,
+        is_allowed: Callable[[Array], bool] | None = None,
     ) -> Self:
         """Returns the space, with the roomiest posture of some random ones as home.
 
@@ -105,7 +101,7 @@ class ArmSpace:
             least: distance of links from each other [m].
         """
         collisions = self.collisions
-        if not self.is_allowed(q):
+        if self.is_allowed and not self.is_allowed(q):
             return False
         if self.floor is not None and collisions.height(q).min() < self.floor:
             return False

@@ -2,9 +2,8 @@
 
 import contextlib
 import dataclasses
-import math
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -14,7 +13,6 @@ import numpy as np
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import write_text
 from drake_disasm.common.progress import Progress, ignore_progress
-from drake_disasm.effects import Effect
 from drake_disasm.experiments import JointPlan
 from drake_disasm.free_motion.arm_limits import CollisionFreeSpace, JointLimits
 from drake_disasm.free_motion.arm_space import ArmSpace
@@ -23,7 +21,7 @@ from drake_disasm.free_motion.playing import MotionPlayer
 from drake_disasm.free_motion.recording import URDF, response_header
 from drake_disasm.free_motion.table import MotionTable
 from drake_disasm.free_motion.way import way_out
-from drake_disasm.logs import Log, LogHeader, LogWriter, flat_columns, read_log
+from drake_disasm.logs import Log, LogHeader, flat_columns, read_log
 from drake_disasm.logs.importing import (
     ImportProcessing,
     Known,
@@ -35,11 +33,10 @@ from drake_disasm.logs.importing import (
 from drake_disasm.scenario import Scenario
 from drake_disasm.stations import Station
 from drake_disasm.stations.hardware import HardwareStation, HoldError
+from sysid.diagnosis.experiment_log import ExperimentLog
 from sysid.diagnosis.in_contact import is_within
-from sysid.effect_selection.close_loop import ClosedLoop, close_loop
 from sysid.models.base import Array, LogModel
 from sysid.models.from_logs import ModelChoice, model_of
-from sysid.workers import Workers
 
 #: Kinds of logs that an arm in free space gives.
 KINDS = ("joint_motion", "joint_response")
@@ -117,20 +114,19 @@ def arm_of_station(
     write_text(Path(urdf), cell_urdf(scenario))
     limits = JointLimits.of_urdf(urdf, station.joints, _ACCELERATION, _MARGIN)
     collisions = CollisionFreeSpace(urdf, station.joints, limits, _CLEARANCE)
-    start, is_allowed = way_out(station)[-1], partial(_is_allowed, station)
+    start, is_allowed = way_out(station)[-1], None
     if isinstance(station, HardwareStation):
         share = (1.0 - _MARGIN) * station.config.safety.velocity_share
         limits = dataclasses.replace(limits, velocity=share * limits.velocity)
+        is_allowed = partial(_is_in_workspace, station)
     space = ArmSpace.of(limits, collisions, _CLEARANCE, _FLOOR, start, is_allowed)
     provenance = {"program": "diagnose"}
     header = response_header(scenario, folder, station.kind, provenance)
     return StationArm(station), space, header
 
 
-def _is_allowed(station: Station, q: Array) -> bool:
+def _is_in_workspace(station: HardwareStation, q: Array) -> bool:
     """Returns whether hardware's workspace has the bolt in postures (n, joints)."""
-    if not isinstance(station, HardwareStation):
-        return True
     p = np.array([station.coordinates.pose(one).translation() for one in q])
     return is_within(station.config.safety, p)
 
@@ -163,7 +159,7 @@ class ArmPerformance:
         return self.measured[name]
 
 
-class GrowingArmLog:
+class GrowingArmLog(ExperimentLog):
     """An arm, and the log of what it played.
 
     Recordings are in the folder `motions`; of kind `joint_motion` they are imported
@@ -191,13 +187,8 @@ class GrowingArmLog:
         progress: Progress = ignore_progress,
     ) -> None:
         self._arm, self.space, self.kind, self.header = arm, space, kind, header
-        self._folder, self._progress = folder, progress
-        self._writer = LogWriter(folder / "motions", header, resume=True)
-
-    @property
-    def episodes(self) -> int:
-        """How many there are."""
-        return self._writer.next_number
+        self._folder = folder
+        super().__init__(folder / "motions", header, progress)
 
     def refuse_hold(self) -> None:
         """Raises HoldError while the arm is held."""
@@ -219,44 +210,23 @@ class GrowingArmLog:
         period = float(self.header.period or 0.0)
         return ArmPerformance(measured, torque, duration, ended, period)
 
-    def verdict(
-        self,
-        effects: Sequence[type[Effect]] | None = None,
-        workers: Workers | None = None,
-        time_budget: float = math.inf,
-        fits: Path | None = None,
-    ) -> ClosedLoop:
-        """Returns the verdict on the log so far; see `GrowingLog.verdict`."""
-        return close_loop(
-            self.model(),
-            train=range(self.episodes),
-            test=(),
-            library=effects,
-            workers=workers,
-            progress=self._progress,
-            folder=fits,
-            time_budget=time_budget,
-        )
-
     def model(self) -> LogModel:
         """Returns the model of the log so far."""
         return model_of([self.log()], ModelChoice())
 
     def log(self) -> Log:
-        """Returns the log so far."""
-        return read_log(self._imported())
-
-    def _imported(self) -> Path:
-        """Returns the folder of the log; that of torques is imported if need be."""
-        motions, log = self._writer.folder, self._folder / "log"
+        """Returns the log so far; that of torques is imported if need be."""
+        motions, folder = self._writer.folder, self._folder / "log"
         if self.kind != "joint_motion":
-            return motions
-        if log.exists() and len(read_log(log).episodes) == self.episodes:
-            return log
-        shutil.rmtree(log, ignore_errors=True)
+            return read_log(motions)
+        if folder.exists():
+            found = read_log(folder)
+            if len(found.episodes) == self.episodes:
+                return found
+            shutil.rmtree(folder)
         sources = [read_source(path) for path in sorted(motions.glob("*.parquet"))]
         known = Known(self.header.joints, in_order=True, urdf=str(self.header.urdf))
         fields = guessed_map(sources[0], self.kind, known)
         imported = import_recordings(sources, fields, ImportProcessing())
-        write_log(imported, sources, fields, log, {"program": "diagnose"})
-        return log
+        write_log(imported, sources, fields, folder, {"program": "diagnose"})
+        return read_log(folder)

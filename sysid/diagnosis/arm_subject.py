@@ -1,7 +1,7 @@
 """An arm in free space, as what is diagnosed."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from drake_disasm.experiments import (
 )
 from drake_disasm.free_motion.arm_space import ArmSpace
 from drake_disasm.logs import LogHeader
-from sysid.diagnosis.arm_log import KINDS, Arm, ArmPerformance, GrowingArmLog
+from sysid.diagnosis.arm_log import KINDS, Arm, GrowingArmLog
 from sysid.diagnosis.design import Prediction, is_enough, predict
 from sysid.diagnosis.in_free_space import ArmRival, arm_forecasts
 from sysid.diagnosis.loop import DEFAULT_BUDGET, Budget, Confirm, Diagnosis, pursue
@@ -85,16 +85,11 @@ class ArmSubject(Subject):
         effects: Sequence[type[Effect]] | None,
         progress: Progress,
     ) -> None:
-        self.settings = {"kind": log.kind, "joints": list(log.header.joints)}
-        self._log, self._effects, self._progress = log, effects, progress
+        settings = {"kind": log.kind, "joints": list(log.header.joints)}
+        super().__init__(log, effects, settings)
+        self._log, self._progress = log, progress
         known = registered_joint_experiments()
         self._kinds = known if experiments is None else experiments
-        self._performed: set[str] = set()
-
-    @property
-    def episodes(self) -> int:
-        """See Subject."""
-        return self._log.episodes
 
     def first(self) -> list[JointPlan]:
         """See Subject."""
@@ -108,21 +103,6 @@ class ArmSubject(Subject):
     def most(self, plan: JointPlan) -> float:
         """See Subject."""
         return float(plan.motion.time[-1]) + _WAY
-
-    def perform(self, plan: JointPlan) -> ArmPerformance:
-        """See Subject."""
-        self._performed.add(plan.text)
-        return self._log.perform(plan)
-
-    def refuse_hold(self) -> None:
-        """See Subject."""
-        self._log.refuse_hold()
-
-    def verdict(
-        self, workers: Workers, time_budget: float, fits: Path | None
-    ) -> ClosedLoop:
-        """See Subject."""
-        return self._log.verdict(self._effects, workers, time_budget, fits)
 
     def rivals(
         self,
@@ -145,6 +125,7 @@ class ArmSubject(Subject):
         rivals: Sequence[Rival],
         need: Need,
         trust: Mapping[str, float],
+        done: Collection[str],
     ) -> list[Prediction]:
         """See Subject."""
         forecasts = partial(
@@ -156,8 +137,7 @@ class ArmSubject(Subject):
         found = predict(plans, rivals, need, forecasts, trust)
         if is_enough(found, rivals, need, math.inf):
             return found
-        designed = [*self._designed(rivals)]
-        more = [plan for plan in designed if plan.text not in self._performed]
+        more = [plan for plan in self._designed(rivals) if plan.text not in done]
         found += predict(more, rivals, need, forecasts, trust)
         return sorted(found, key=lambda each: -each.value)
 

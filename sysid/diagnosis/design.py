@@ -49,7 +49,6 @@ class Forecast:
         greatest: force and torque under any rival [N, N m].
         signals: of each rival its own (n,), and one for each parameter that is moved by
             a standard deviation; in standard deviations of what is measured anyway.
-        rows: of a log that are added.
         channel: in which rivals differ most, with its unit.
         unit: of that.
         shown: of each rival (n,) in that channel.
@@ -61,12 +60,16 @@ class Forecast:
     duration: float
     greatest: tuple[float, float]
     signals: Sequence[Sequence[Array]]
-    rows: int
     channel: str
     unit: str
     shown: Sequence[Array]
     period: float
     hazard: str
+
+    @property
+    def rows(self) -> int:
+        """Of a log that are added."""
+        return round(self.duration / self.period)
 
 
 #: Returns what rivals predict of experiments: of each plan, in order.

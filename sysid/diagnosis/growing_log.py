@@ -1,27 +1,23 @@
-"""A log that grows by an episode for each experiment, and the verdict on it so far."""
+"""A station in contact, and the log of the experiments on it."""
 
-import math
-from collections.abc import Sequence
 from pathlib import Path
 
 from drake_disasm.common.progress import Progress, ignore_progress
-from drake_disasm.effects import Effect
 from drake_disasm.experiments import Plan
 from drake_disasm.experiments.performing import Laboratory, Performance
-from drake_disasm.logs import LogWriter, read_log
+from drake_disasm.logs import read_log
 from drake_disasm.logs.columns import flat_columns
 from drake_disasm.safety import SafetyConfig
 from drake_disasm.scenario import Scenario
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 from drake_disasm.task.simulation import StationFactory
 from drake_disasm.visualization import MeshcatView
-from sysid.effect_selection.close_loop import ClosedLoop, close_loop
+from sysid.diagnosis.experiment_log import ExperimentLog
 from sysid.models.base import LogModel
 from sysid.models.from_logs import ModelChoice, model_of
-from sysid.workers import Workers
 
 
-class GrowingLog:
+class GrowingLog(ExperimentLog):
     """A station, and the log of what was performed on it.
 
     Args:
@@ -46,17 +42,12 @@ class GrowingLog:
         seed: int = 0,
     ) -> None:
         self.seed = seed
-        self._scenario, self._folder, self._progress = scenario, folder, progress
+        self._scenario, self._folder = scenario, folder
         self._view, views = view, [view] if view else []
         self._laboratory = Laboratory(real or scenario, station, views)
         kind = self._laboratory.station.kind
         header = transitions_header(scenario, kind, {"program": "diagnose"})
-        self._writer = LogWriter(folder, header, resume=True)
-
-    @property
-    def episodes(self) -> int:
-        """How many there are."""
-        return self._writer.next_number
+        super().__init__(folder, header, progress)
 
     @property
     def limits(self) -> SafetyConfig | None:
@@ -90,35 +81,6 @@ class GrowingLog:
         found = laboratory.perform(plan, seed, recorder, self._progress)
         self._writer.write_episode(flat_columns("transitions", recorder.columns()))
         return found
-
-    def verdict(
-        self,
-        effects: Sequence[type[Effect]] | None = None,
-        workers: Workers | None = None,
-        time_budget: float = math.inf,
-        fits: Path | None = None,
-    ) -> ClosedLoop:
-        """Returns the verdict on the log so far.
-
-        Every episode is fitted, contiguous blocks are held out in turn: an experiment
-        is made to be learned from.
-
-        Args:
-            effects: that may be named; all registered ones if left out.
-            workers: fit.
-            time_budget: see close_loop [s].
-            fits: folder of a cache of them.
-        """
-        return close_loop(
-            self.model(),
-            train=range(self.episodes),
-            test=(),
-            library=effects,
-            workers=workers,
-            progress=self._progress,
-            folder=fits,
-            time_budget=time_budget,
-        )
 
     def model(self, scenario: Scenario | None = None) -> LogModel:
         """Returns the model of the log so far, with the effects of a scenario.

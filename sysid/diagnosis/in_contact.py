@@ -77,7 +77,6 @@ def twin_forecasts(
                 duration,
                 (max(forces), max(torques)),
                 signals,
-                round(duration / plan.period),
                 STATE_NAMES[i],
                 STATE_UNITS[i],
                 [own[0][:, i] for own in same],

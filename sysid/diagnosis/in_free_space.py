@@ -37,16 +37,13 @@ class ArmRival(Rival):
 
     Attributes:
         effects: that it has.
-        values: of the model's parameters, by name.
+        values: of the model's parameters, by name; `varied` has such, too.
         sigma: (channels,) by which a row may differ anyway.
-        varied: the values, moved by a standard deviation along each axis of the
-            covariance of the effects' parameters.
     """
 
     effects: tuple[Candidate, ...]
     values: Mapping[str, float]
     sigma: Array
-    varied: tuple[Mapping[str, float], ...] = ()
 
     @classmethod
     def of(cls, name: str, fit: Fit, weight: float, loss: float) -> Self:
@@ -58,17 +55,7 @@ class ArmRival(Rival):
         ]
         sigma = np.sqrt(np.mean(np.atleast_2d(fit.model.measurements.sigma) ** 2, 0))
         effects, values = fit.effects, fit.values
-        return cls(name, weight, loss, effects, values, sigma, tuple(varied))
-
-    @property
-    def is_uncertain(self) -> bool:
-        """See Rival."""
-        return bool(self.varied)
-
-    @property
-    def with_known_parameters(self) -> Self:
-        """See Rival."""
-        return dataclasses.replace(self, varied=())
+        return cls(name, weight, loss, effects, values, sigma, varied=tuple(varied))
 
     def predictions(self, model: LogModel) -> Iterator[Array]:
         """Yields what it predicts of a log (rows, channels), and what if varied.
@@ -117,7 +104,6 @@ def arm_forecasts(
                 float(plan.motion.time[-1]),
                 (0.0, float(np.abs(torques).max())),
                 signals,
-                first.shape[1],
                 joints[i],
                 channel.unit,
                 [own[:, i] for own in first],

@@ -144,13 +144,13 @@ def pursue(
         closed = subject.verdict(workers, budget.verdict, fits)
         asked = [each.names for each in session.rounds]
         rivals = subject.rivals(closed, workers, fits, asked)
-        need = Need.of(closed)
-        predictions = session.predict(plans, rivals, need)
-        left = budget.robot - session.robot_time
-        best, reason = _choice(closed, rivals, predictions, need, left)
         refuted = refuted_names(session.rounds, closed.verdict.names)
-        if len(refuted) >= _REFUTED:
-            best, reason = None, _no_name_stands(refuted)
+        if is_refuted := len(refuted) >= _REFUTED:
+            predictions, best, reason = [], None, _no_name_stands(refuted)
+        else:
+            need, left = Need.of(closed), budget.robot - session.robot_time
+            predictions = session.predict(plans, rivals, need)
+            best, reason = _choice(closed, rivals, predictions, need, left)
         if best is not None and not confirm(_question(best)):
             best, reason = None, "stopped by hand; the same command goes on from here"
         if best is None:
@@ -162,7 +162,7 @@ def pursue(
                 session.first_time,
                 tuple(predictions),
                 rivals,
-                len(refuted) >= _REFUTED,
+                is_refuted,
             )
         session.experiment(closed, rivals, best)
 
@@ -287,7 +287,7 @@ class _Session:
     def record_first(self, budget: Budget, confirm: Confirm) -> None:
         """Records what the first verdict needs, as far as the log lacks it."""
         subject = self._subject
-        for plan in subject.first()[subject.episodes :]:
+        for plan in subject.first()[subject.log.episodes :]:
             if self.first_time > budget.robot:
                 raise DisasmError(
                     f"budget: {budget.robot:g} s are spent before the first verdict; "
@@ -295,9 +295,9 @@ class _Session:
                 )
             if not confirm(f"{plan.text}: at most {subject.most(plan):.0f} s"):
                 raise DisasmError("stopped by hand before the first verdict")
-            self.first_time += subject.perform(plan).duration
+            self.first_time += subject.log.perform(plan).duration
             self._write("")
-            subject.refuse_hold()
+            subject.log.refuse_hold()
 
     def predict(
         self, plans: Sequence[Any], rivals: Sequence[Rival], need: Need
@@ -313,14 +313,14 @@ class _Session:
         left = [plan for plan in plans if plan.text not in done]
         classes = Counter(text.partition("(")[0] for text in done)
         trust = {name: _TRUST**count for name, count in classes.items()}
-        return self._subject.predict(left, rivals, need, trust)
+        return self._subject.predict(left, rivals, need, trust, done)
 
     def experiment(
         self, closed: ClosedLoop, rivals: Sequence[Rival], chosen: Prediction
     ) -> None:
         """Performs an experiment and adds it to the log."""
-        number, forecast = self._subject.episodes, chosen.forecast
-        found = self._subject.perform(chosen.plan)
+        log, forecast = self._subject.log, chosen.forecast
+        number, found = log.episodes, log.perform(chosen.plan)
         force, torque = found.greatest
         pairs = zip(rivals, forecast.shown, strict=True)
         self.rounds.append(
@@ -341,7 +341,7 @@ class _Session:
             )
         )
         self._write("")
-        self._subject.refuse_hold()
+        log.refuse_hold()
 
     def close(self, closed: ClosedLoop, rivals: Sequence[Rival], reason: str) -> None:
         """Notes the last verdict, which has no experiment, and why it is the last."""

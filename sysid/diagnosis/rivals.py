@@ -1,12 +1,11 @@
 """The hypotheses that a verdict leaves: what the model may lack, each fitted."""
 
-import abc
 import dataclasses
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -40,7 +39,7 @@ _MOST = 6  # hypotheses about what a log could not have shown
 
 
 @dataclasses.dataclass(frozen=True)
-class Rival(abc.ABC):
+class Rival:
     """A hypothesis.
 
     Attributes:
@@ -51,22 +50,25 @@ class Rival(abc.ABC):
         loss: that it leaves of rows of the log that it was not fitted to.
         is_guess: whether the log speaks against it, and an experiment is to show
             whether that stands.
+        varied: the same, moved by a standard deviation along each axis of the
+            covariance of its effects' parameters.
     """
 
     name: str
     weight: float
     loss: float
     is_guess: bool = dataclasses.field(default=False, kw_only=True)
+    varied: tuple[Any, ...] = dataclasses.field(default=(), kw_only=True)
 
     @property
-    @abc.abstractmethod
     def is_uncertain(self) -> bool:
         """Whether any of its parameters is."""
+        return bool(self.varied)
 
     @property
-    @abc.abstractmethod
     def with_known_parameters(self) -> Self:
         """The same, as if its parameters were known."""
+        return dataclasses.replace(self, varied=())
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,23 +76,10 @@ class TwinRival(Rival):
     """A hypothesis about a station in contact.
 
     Attributes:
-        scenario: the model with its effects, fitted.
-        varied: the scenario, moved by a standard deviation along each axis of the
-            covariance of its effects' parameters.
+        scenario: the model with its effects, fitted; `varied` has such, too.
     """
 
     scenario: Scenario
-    varied: tuple[Scenario, ...] = ()
-
-    @property
-    def is_uncertain(self) -> bool:
-        """See Rival."""
-        return bool(self.varied)
-
-    @property
-    def with_known_parameters(self) -> Self:
-        """See Rival."""
-        return dataclasses.replace(self, varied=())
 
 
 #: Returns the hypothesis of a name, a fit, a weight and a loss; None: there is none.
@@ -223,7 +212,7 @@ def twin_rival(name: str, fit: Fit, weight: float, loss: float) -> TwinRival | N
         return None
     varied = [fit.model.scenario_at(theta) for theta in varied_parameters(fit)]
     known = tuple(each for each in varied if each is not None)
-    return TwinRival(name, weight, loss, scenario, known)
+    return TwinRival(name, weight, loss, scenario, varied=known)
 
 
 def varied_parameters(fit: Fit) -> Iterator[Array]:

@@ -1,13 +1,12 @@
 """A station in contact, as what is diagnosed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
 from drake_disasm.common.progress import Progress
 from drake_disasm.effects import Effect
 from drake_disasm.experiments import Experiment, Plan, Removal, registered_experiments
-from drake_disasm.experiments.performing import Performance
 from drake_disasm.scenario import Scenario, scenario_to_mapping
 from sysid.diagnosis.design import Prediction, predict
 from sysid.diagnosis.growing_log import GrowingLog
@@ -37,15 +36,10 @@ class StationSubject(Subject):
         effects: Sequence[type[Effect]] | None,
         progress: Progress,
     ) -> None:
-        self.settings = {"scenario": scenario_to_mapping(scenario)}
-        self._scenario, self._log, self._effects = scenario, log, effects
+        super().__init__(log, effects, {"scenario": scenario_to_mapping(scenario)})
+        self._scenario, self._log = scenario, log
         kinds = registered_experiments() if experiments is None else experiments
         self._kinds, self._progress = kinds, progress
-
-    @property
-    def episodes(self) -> int:
-        """See Subject."""
-        return self._log.episodes
 
     def first(self) -> list[Plan]:
         """See Subject."""
@@ -61,20 +55,6 @@ class StationSubject(Subject):
     def most(self, plan: Plan) -> float:
         """See Subject."""
         return plan.most_steps * plan.period
-
-    def perform(self, plan: Plan) -> Performance:
-        """See Subject."""
-        return self._log.perform(plan)
-
-    def refuse_hold(self) -> None:
-        """See Subject."""
-        self._log.refuse_hold()
-
-    def verdict(
-        self, workers: Workers, time_budget: float, fits: Path | None
-    ) -> ClosedLoop:
-        """See Subject."""
-        return self._log.verdict(self._effects, workers, time_budget, fits)
 
     def rivals(
         self,
@@ -94,6 +74,7 @@ class StationSubject(Subject):
         rivals: Sequence[Rival],
         need: Need,
         trust: Mapping[str, float],
+        done: Collection[str],
     ) -> list[Prediction]:
         """See Subject."""
         forecasts = partial(

@@ -1,54 +1,44 @@
 """What is diagnosed: a station in contact, or an arm in free space."""
 
 import abc
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-import numpy as np
-
+from drake_disasm.effects import Effect
 from sysid.diagnosis.design import Prediction
+from sysid.diagnosis.experiment_log import ExperimentLog
 from sysid.diagnosis.rivals import Need, Rival
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.workers import Workers
-
-
-class Performed(Protocol):
-    """What came of an experiment."""
-
-    @property
-    def duration(self) -> float:
-        """Robot time [s]."""
-
-    @property
-    def greatest(self) -> tuple[float, float]:
-        """Greatest force and torque [N, N m]."""
-
-    @property
-    def ended(self) -> str:
-        """Why it was cut short; empty if it was performed whole."""
-
-    @property
-    def period(self) -> float:
-        """Of rows that were measured [s]."""
-
-    def channel(self, name: str) -> np.ndarray:
-        """Returns what was measured in a channel (n,)."""
 
 
 class Subject(abc.ABC):
     """What is diagnosed, with the log of what was performed on it.
 
     Attributes:
+        log: of it.
         settings: plain data; a diagnosis is taken up only with the same.
+
+    Args:
+        log: see the attributes.
+        effects: that may be named; None: all registered ones.
+        settings: see the attributes.
     """
 
-    settings: Mapping[str, Any]
+    def __init__(
+        self,
+        log: ExperimentLog,
+        effects: Sequence[type[Effect]] | None,
+        settings: Mapping[str, Any],
+    ) -> None:
+        self.log, self._effects, self.settings = log, effects, settings
 
-    @property
-    @abc.abstractmethod
-    def episodes(self) -> int:
-        """How many the log has."""
+    def verdict(
+        self, workers: Workers, time_budget: float, fits: Path | None
+    ) -> ClosedLoop:
+        """Returns the verdict on the log so far; see `ExperimentLog.verdict`."""
+        return self.log.verdict(self._effects, workers, time_budget, fits)
 
     @abc.abstractmethod
     def first(self) -> Sequence[Any]:
@@ -61,26 +51,6 @@ class Subject(abc.ABC):
     @abc.abstractmethod
     def most(self, plan: Any) -> float:
         """Returns how long an experiment may take [s]."""
-
-    @abc.abstractmethod
-    def perform(self, plan: Any) -> Performed:
-        """Performs an experiment, which becomes an episode of the log."""
-
-    @abc.abstractmethod
-    def refuse_hold(self) -> None:
-        """Raises HoldError while the station holds."""
-
-    @abc.abstractmethod
-    def verdict(
-        self, workers: Workers, time_budget: float, fits: Path | None
-    ) -> ClosedLoop:
-        """Returns the verdict on the log so far.
-
-        Args:
-            workers: fit.
-            time_budget: see close_loop [s].
-            fits: folder of a cache of them.
-        """
 
     @abc.abstractmethod
     def rivals(
@@ -106,5 +76,14 @@ class Subject(abc.ABC):
         rivals: Sequence[Rival],
         need: Need,
         trust: Mapping[str, float],
+        done: Collection[str],
     ) -> list[Prediction]:
-        """Returns how well experiments separate rivals; see `design.predict`."""
+        """Returns how well experiments separate rivals; see `design.predict`.
+
+        Args:
+            plans: to choose from.
+            rivals: at least two.
+            need: how far apart they have to be.
+            trust: in the distances of a class of experiments, by its name.
+            done: experiments that were performed, in words.
+        """

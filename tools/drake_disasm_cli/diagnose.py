@@ -141,6 +141,7 @@ def main(arguments: Sequence[str]) -> int:
     _refuse_contradictions(args)
     real = common.real_scenario(args, scenario)
     kinds = [kind for name in args.experiments or () for kind in _experiments(name)]
+    _refuse_others(kinds, args.kind)
     budget = Budget(args.robot_time, _MINUTE * args.verdict_time)
     confirm = (lambda _: True) if args.yes else _asked
     with (
@@ -186,7 +187,6 @@ def _station_subject(
     view = MeshcatView(start_meshcat(), record=True) if args.html else None
     log = GrowingLog(model, args.out / "log", station, real, progress, view)
     own = [kind for kind in kinds if issubclass(kind, Experiment)]
-    _refuse_others(kinds, own, args.kind)
     return StationSubject(model, log, own or None, None, progress)
 
 
@@ -200,7 +200,6 @@ def _arm_subject(
 ) -> Subject:
     """Returns the station's arm in free space, as what is diagnosed."""
     own = [kind for kind in kinds if issubclass(kind, JointExperiment)]
-    _refuse_others(kinds, own, args.kind)
     make_folder(args.out)
     made = make_station(station, real) if isinstance(station, str) else station(real)
     arm, space, header = arm_of_station(made, scenario, args.out)
@@ -208,12 +207,11 @@ def _arm_subject(
     return ArmSubject(log, own or None, None, progress)
 
 
-def _refuse_others(
-    kinds: Sequence[type[AnyExperiment]], own: Sequence[type[AnyExperiment]], kind: str
-) -> None:
+def _refuse_others(kinds: Sequence[type[AnyExperiment]], kind: str) -> None:
     """Raises DisasmError for the first experiment that is not for a kind of log."""
+    base = Experiment if kind == _IN_CONTACT else JointExperiment
     for each in kinds:
-        if each not in own:
+        if not issubclass(each, base):
             raise DisasmError(f"--experiments {each.__name__}: not for --kind {kind}")
 
 

@@ -25,10 +25,7 @@ from drake_disasm.free_motion.playing import MotionPlayer
 from drake_disasm.free_motion.recording import URDF, response_header
 from drake_disasm.free_motion.table import read_motion, refuse_beyond_limits
 from drake_disasm.logs import LogWriter, flat_columns
-from drake_disasm.scenario import (
-    Scenario,
-    load_scenario,
-)
+from drake_disasm.scenario import Scenario, load_scenario
 from drake_disasm.stations import Station, make_station
 from drake_disasm.visualization import add_cell_view, start_meshcat
 from drake_disasm_cli import common, hardware

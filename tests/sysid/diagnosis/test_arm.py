@@ -114,7 +114,7 @@ def test_a_motion_is_designed_where_the_library_has_none(tmp_path: Path) -> None
     log.perform(JointExcitation(5.0).plan(arm.space))
     base = {p.name: p.nominal for p in log.model().parameters}
     subject = ArmSubject(log, [], FRICTION, ignore_progress)
-    [designed] = subject.predict([], rivals(**base), Need(25.0), {})
+    [designed] = subject.predict([], rivals(**base), Need(25.0), {}, ())
     assert designed.plan.text.startswith("SeparatingMotion(JointCoulombFriction, ")
     assert designed.farthest > 5.0 and not designed.hazard
     ends = designed.plan.motion.q[[0, -1]]
