@@ -206,6 +206,18 @@ class Effect:
         return shape_parameters(cls)
 
     @classmethod
+    def greatest_shapes(cls, duration: float) -> dict[str, float]:
+        """Returns the greatest values of shape parameters in a log, by name.
+
+        Beyond them it is what another effect is: a step that takes as long as the log
+        is a drift.
+
+        Args:
+            duration: of the log's longest episode [s]; infinite if it is not known.
+        """
+        return {}
+
+    @classmethod
     def description(cls) -> str:
         """Returns what it is, in a line: the first paragraph of its docstring."""
         paragraph = inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0]

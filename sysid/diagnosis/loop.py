@@ -10,7 +10,7 @@ from typing import Any
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, read_json, write_json
 from sysid.diagnosis.design import Prediction, is_enough
-from sysid.diagnosis.rivals import NOTHING, Need, Rival
+from sysid.diagnosis.rivals import NOTHING, TRIED, Need, Rival
 from sysid.diagnosis.subject import Subject
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.effect_names import short_names
@@ -144,13 +144,13 @@ def pursue(
         closed = subject.verdict(workers, budget.verdict, fits)
         asked = [each.names for each in session.rounds]
         rivals = subject.rivals(closed, workers, fits, asked)
-        refuted = refuted_names(session.rounds, closed.verdict.names)
+        refuted = refuted_names(asked, closed.verdict.names)
         if is_refuted := len(refuted) >= _REFUTED:
             predictions, best, reason = [], None, _no_name_stands(refuted)
         else:
             need, left = Need.of(closed), budget.robot - session.robot_time
             predictions = session.predict(plans, rivals, need)
-            best, reason = _choice(closed, rivals, predictions, need, left)
+            best, reason = _choice(closed, rivals, predictions, need, left, asked)
         if best is not None and not confirm(_question(best)):
             best, reason = None, "stopped by hand; the same command goes on from here"
         if best is None:
@@ -173,8 +173,11 @@ def _choice(
     predictions: Sequence[Prediction],
     need: Need,
     left: float,
+    asked: Sequence[tuple[str, ...]],
 ) -> tuple[Prediction | None, str]:
     """Returns the experiment to perform, or why there is none.
+
+    What is merely suggested a second recording has to show, whichever it is.
 
     Args:
         closed: the verdict.
@@ -182,11 +185,16 @@ def _choice(
         predictions: of experiments that were not performed yet, the best first.
         need: how far apart rivals have to be.
         left: robot time [s].
+        asked: names of the verdict before each experiment.
     """
     if len(rivals) < 2:
         return None, _settled(closed)
-    affordable = [p for p in predictions if p.is_helpful and p.duration <= left]
-    if is_enough(affordable, rivals, need, left):
+    affordable = [p for p in predictions if not p.hazard and p.duration <= left]
+    helpful = [p for p in affordable if p.is_helpful]
+    if is_enough(helpful, rivals, need, left):
+        return helpful[0], ""
+    verdict = closed.verdict
+    if verdict.suggested and affordable and asked.count(verdict.names) < TRIED:
         return affordable[0], ""
     if all(rival.is_guess for rival in rivals[1:]):
         return None, _settled(closed)
@@ -208,22 +216,17 @@ def _settled(closed: ClosedLoop) -> str:
     return f"settled: the model lacks {names}"
 
 
-def refuted_names(rounds: Sequence[Round], names: Sequence[str]) -> tuple[str, ...]:
-    """Returns what verdicts named, before an experiment that spoke for something else.
-
-    For what was not among their rivals either.
+def refuted_names(
+    asked: Sequence[Sequence[str]], names: Sequence[str]
+) -> tuple[str, ...]:
+    """Returns the different verdicts of which no name is left.
 
     Args:
-        rounds: that ended with an experiment.
+        asked: names of the verdict before each experiment.
         names: of the verdict after the last.
     """
-    named = [*(each.names for each in rounds), names]
-    return tuple(
-        short_names(each.names)
-        for each, new in zip(rounds, named[1:], strict=True)
-        if each.names and set(new) != set(each.names)
-        if (short_names(new) or NOTHING) not in each.rivals
-    )
+    given_up = [each for each in asked if each and not set(each) & set(names)]
+    return tuple(dict.fromkeys(short_names(sorted(each)) for each in given_up))
 
 
 def _no_name_stands(refuted: Sequence[str]) -> str:

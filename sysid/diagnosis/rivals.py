@@ -26,6 +26,9 @@ from sysid.workers import Workers
 #: What the hypothesis is called that the model lacks nothing (more).
 NOTHING = "nothing"
 
+#: How many experiments are made about something that is unexplained, or suggested.
+TRIED = 3
+
 #: How far apart two rivals are that differ by more than chance, in standard deviations.
 BY_CHANCE = 5.0
 
@@ -34,7 +37,6 @@ _DRAWS = 2000  # of folds: a weight of a half is then known to a hundredth
 _OF_BOUND = 0.5  # of an amplitude that no size within its bounds would have shown
 _TIMES = 2.0  # the size that would have been found
 _SUSPECTS = 3  # of something that is unexplained
-_TRIED = 3  # experiments, until that is taken to be in no library
 _MOST = 6  # hypotheses about what a log could not have shown
 
 
@@ -185,7 +187,7 @@ def _open_sets(
     explains is asked about more often.
     """
     verdict = closed.verdict
-    is_left = verdict.ending in ("unexplained", "partly") and len(asked) < _TRIED
+    is_left = verdict.ending in ("unexplained", "partly") and len(asked) < TRIED
     has_to_stand = not asked or set(asked[-1]) != set(verdict.names)
     is_short = closed.last.model.makes_contact
     if verdict.ambiguous or verdict.suggested:

@@ -18,7 +18,7 @@ from sysid.models.effects import (
     field_of,
     is_shown,
     with_fields,
-    within_travel,
+    within_reach,
 )
 from sysid.models.measurements import Measurements
 from sysid.models.signed_order import SignedOrder
@@ -199,7 +199,7 @@ class LogModel(abc.ABC):
             parameters: additional ones, fields of effects: their paths are
                 `effects.0.size` and the like.
         """
-        added = within_travel(parameters, effects, self.travel)
+        added = within_reach(parameters, effects, self.travel, self.duration)
         return self.replace(
             _effects=tuple(effects), parameters=(*self.parameters, *added)
         )

@@ -111,24 +111,28 @@ def is_shown(
     return all(getattr(effect, name) >= value for name, value in least.items())
 
 
-def within_travel(
+def within_reach(
     parameters: Sequence[Parameter],
     effects: Sequence[Effect],
     travel: Mapping[str, float],
+    duration: float,
 ) -> list[Parameter]:
-    """Returns fields of effects, their shapes bounded by what a motion can show.
+    """Returns fields of effects, their shapes bounded by what a log can show.
 
     Args:
         parameters: whose paths are `effects.0.size` and the like.
         effects: of the model.
         travel: of each joint, by name [rad or m].
+        duration: of the longest episode [s]; infinite if it is not known.
     """
     found = []
     for parameter in parameters:
-        effect = effects[int(parameter.path.split(".")[1])]
-        least = _least_shapes(effect, travel).get(field_of(parameter), parameter.low)
+        effect, field = effects[int(parameter.path.split(".")[1])], field_of(parameter)
+        least = _least_shapes(effect, travel).get(field, -math.inf)
+        most = effect.greatest_shapes(duration).get(field, math.inf)
         low = min(max(parameter.low, least), parameter.nominal)
-        found.append(dataclasses.replace(parameter, low=low))
+        high = max(min(parameter.high, most), parameter.nominal)
+        found.append(dataclasses.replace(parameter, low=low, high=high))
     return found
 
 

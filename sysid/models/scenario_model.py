@@ -7,6 +7,7 @@ from typing import Self
 from drake_disasm.effects import Effect
 from drake_disasm.scenario import Scenario, with_values
 from sysid.models.base import Array, LogModel
+from sysid.models.effects import within_reach
 from sysid.parameters import Parameter, by_name, by_path
 
 
@@ -32,9 +33,10 @@ class ScenarioModel(LogModel):
         self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
     ) -> Self:
         """See LogModel."""
+        added = within_reach(parameters, effects, self.travel, self.duration)
         return self.replace(
             scenario=dataclasses.replace(self.scenario, effects=list(effects)),
-            parameters=(*self.parameters, *parameters),
+            parameters=(*self.parameters, *added),
         )
 
     def freeze(self, values: Mapping[str, float]) -> Self:

@@ -11,6 +11,7 @@ from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
 
 _PARTS = 16  # of a log, between which a search for the onset starts
+_SLOWEST = 2  # of them, in which it sets in
 
 
 @register_effect
@@ -45,6 +46,11 @@ class SensorStep(SensorEffect):
         "SensorWarmUp": "a longer rest: a step does not settle",
         "SensorDrift": "a longer rest: after a step the reading stays",
     }
+
+    @classmethod
+    def greatest_shapes(cls, duration: float) -> dict[str, float]:
+        """See Effect: what sets in more slowly is a drift, or a warm-up."""
+        return {"rise": _SLOWEST * duration / _PARTS}
 
     @classmethod
     def grids(cls, duration: float) -> dict[str, tuple[float, ...]]:

@@ -10,7 +10,7 @@ from drake_disasm.effects import SensorDrift, SensorGain, SensorWarmUp
 from drake_disasm.experiments import Presses, Rest, Reversals
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
-from sysid.diagnosis import NOTHING, Budget, Round, diagnose
+from sysid.diagnosis import NOTHING, Budget, diagnose
 from sysid.diagnosis.loop import refuted_names
 from sysid.report import diagnosis_page
 from tests.refusals import refused
@@ -48,16 +48,13 @@ def test_it_ends_with_what_is_hidden(warm) -> None:
         assert set(each.predicted) == set(each.rivals)
 
 
-def test_names_are_refuted_by_what_was_no_rival_of_theirs() -> None:
-    one = Round("", ("A",), {"A": 0.9, "B": 0.1})
-    assert refuted_names([one], ("A",)) == ()
-    assert refuted_names([one], ("B",)) == ()
-    assert refuted_names([one], ("C",)) == ("A",)
-    nothing = Round("", (), {"nothing": 1.0})
-    assert refuted_names([nothing], ("A",)) == ()
-    two = Round("", ("B", "C"), {"B": 0.5, "nothing": 0.5})
-    assert refuted_names([one, two], ()) == ("A",)
-    assert refuted_names([one, two], ("D",)) == ("A", "B and C")
+def test_verdicts_are_refuted_of_which_no_name_is_left() -> None:
+    one, two = ("A",), ("B", "C")
+    assert refuted_names([one], one) == ()
+    assert refuted_names([one], two) == ("A",)
+    assert refuted_names([()], one) == ()
+    assert refuted_names([one, two, one], ("B",)) == ("A",)
+    assert refuted_names([one, two, ("C", "B")], ("D",)) == ("A", "B and C")
 
 
 def test_the_report_tells_the_story(warm) -> None:
