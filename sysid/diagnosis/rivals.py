@@ -15,6 +15,7 @@ from sysid.diagnosis.growing_log import GrowingLog
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effect_class, short_names
+from sysid.effect_selection.forward_selection import room
 from sysid.fitting.candidates import Candidate, candidates
 from sysid.fitting.fit import Fit
 from sysid.fitting.fitter import Fitter
@@ -107,9 +108,9 @@ class Need:
     @classmethod
     def of(cls, closed: ClosedLoop) -> "Need":
         """Returns what a verdict needs."""
-        left = closed.last.loss
-        taken = max(closed.first.loss - left, 0.0)
-        margin = closed.last.settings.ambiguity_margin * min(taken, left)
+        left = closed.last.held_out_losses
+        taken = closed.first.held_out_losses - left
+        margin = closed.last.settings.ambiguity_margin * room(taken, left)
         return cls(margin, margin / closed.last.model.measurements.rows)
 
     def distances(self, rivals: Sequence[Rival], rows: int) -> Array:

@@ -5,6 +5,7 @@ were fitted to the others. In each step the candidate that lowers it most is add
 those that are about as good, the one with the fewest coefficients.
 """
 
+import dataclasses
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as t_distribution
+from scipy.stats import wilcoxon
 
 from sysid.fitting.block_grams import (
     Array,
@@ -66,13 +68,29 @@ class Gain:
 
     Attributes:
         term: with the columns that can help.
-        share: of the loss.
         of_blocks: (F,) of each fold's loss, in units of the loss of all.
+        left: (F,) of each fold's loss, in the same units.
     """
 
     term: Term
-    share: float
     of_blocks: Array
+    left: Array
+
+    @classmethod
+    def of(cls, term: Term, before: Array, after: Array) -> "Gain":
+        """Returns the gain of a term by the losses (F,) of folds before and with it."""
+        whole = max(float(before.sum()), 1e-300)
+        return cls(term, (before - after) / whole, after / whole)
+
+    @property
+    def share(self) -> float:
+        """Of the loss."""
+        return float(self.of_blocks.sum())
+
+    @property
+    def room(self) -> float:
+        """See `room`."""
+        return room(self.of_blocks, self.left)
 
     @property
     def text(self) -> str:
@@ -84,25 +102,33 @@ class Gain:
 
     def is_about_as_good_as(self, best: "Gain", settings: SelectionSettings) -> bool:
         """Returns whether it gains and leaves nearly as much as another, the best."""
-        room = max(min(best.share, 1.0 - best.share), 0.0)  # the best may lose
-        margin = settings.ambiguity_margin * room
-        return self.share >= best.share - margin
+        return self.share >= best.share - settings.ambiguity_margin * best.room
 
     def is_ambiguous_with(self, other: "Gain", settings: SelectionSettings) -> bool:
         """Returns whether folds can't distinguish this, which gains less, from another.
 
         Because it gains nearly as much, or more in so many folds that the difference is
-        chance (paired, one-sided t-test over the folds).
+        chance (one-sided signed-rank test, Wilcoxon 1945: folds need not show an effect
+        alike, as long ones show a drift).
         """
         if self.is_about_as_good_as(other, settings):
             return True
         if self.share < settings.ambiguity_least * other.share:
             return False
         difference = other.of_blocks - self.of_blocks
-        count = len(difference)
-        error = float(difference.std(ddof=1)) * np.sqrt(count)
-        critical = t_distribution.isf(settings.alpha, count - 1)
-        return bool(other.share - self.share < critical * error)
+        return bool(wilcoxon(difference, alternative="greater").pvalue > settings.alpha)
+
+
+def room(taken: Array, left: Array) -> float:
+    """Returns what is taken away of a loss or what is left, whichever is less.
+
+    Fold by fold: what no effect explains in one says nothing of what explains another.
+
+    Args:
+        taken: (F,) of each fold's loss.
+        left: (F,) of it.
+    """
+    return float(np.minimum(taken, left).clip(0.0).sum())
 
 
 @dataclass(frozen=True)
@@ -200,7 +226,7 @@ def _selected(
         whole, base, [step.chosen.term for step in steps], settings
     )
     steps = [
-        Step(Gain(term, s.chosen.share, s.chosen.of_blocks), s.rivals)
+        Step(dataclasses.replace(s.chosen, term=term), s.rivals)
         for s in steps
         if len((term := s.chosen.term.of_columns(kept)).columns)
     ]
@@ -274,8 +300,7 @@ def thinned(
         if len(kept) and losses[number].sum() > enough:
             break
         kept, least = sets[number], losses[number]
-    gains = (before - least) / max(float(before.sum()), 1e-300)
-    return Gain(gain.term.of_columns(kept), float(gains.sum()), gains)
+    return Gain.of(gain.term.of_columns(kept), before, least)
 
 
 def rivals_of(
@@ -354,7 +379,6 @@ def ranked(
     """Returns what terms gain, the best first; those that can't help are left out."""
     folds = equations.folds(settings.folds)
     before = folds.losses
-    total = max(float(before.sum()), 1e-300)
     each = folds.held_out_each()
     found = []
     for term in terms:
@@ -363,8 +387,7 @@ def ranked(
             continue
         single = len(columns) == 1
         after = each[:, columns[0]] if single else folds.held_out(columns)
-        gains = (before - after) / total
-        found.append(Gain(term.of_columns(columns), float(gains.sum()), gains))
+        found.append(Gain.of(term.of_columns(columns), before, after))
     return sorted(found, key=lambda gain: -gain.share)
 
 

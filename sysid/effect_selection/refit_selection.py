@@ -141,7 +141,8 @@ class RefitSelection:
         Those that gain nothing by it come last.
         """
         gains = ranked(system.equations(), system.terms, self._settings)
-        nothing = [Gain(term, 0.0, np.zeros(1)) for term in system.terms]
+        one = np.ones(1)
+        nothing = [Gain.of(term, one, one) for term in system.terms]
         best: dict[_Names, Gain] = {}
         for gain in [*gains, *nothing]:
             best.setdefault(gain.term.names, gain)
@@ -233,14 +234,12 @@ class RefitSelection:
             tests = len({candidate.name for candidate in self.library})
             if tests * exceeds_noise_p(before, after, count) >= self._settings.alpha:
                 return None
-        losses = before.held_out_losses, after.held_out_losses
-        total = max(float(losses[0].sum()), 1e-300)
-        of_folds = (losses[0] - losses[1]) / total
         columns = np.arange(count)
         owners = np.repeat(
             np.arange(len(added)), [len(candidate.fields) for candidate in added]
         )
-        return Gain(Term(added, columns, owners), float(of_folds.sum()), of_folds)
+        term = Term(added, columns, owners)
+        return Gain.of(term, before.held_out_losses, after.held_out_losses)
 
     def _without_needless(self, fit: Fit) -> Fit:
         """Returns the fit without effects that later ones have made needless."""
@@ -305,10 +304,10 @@ class _TrialFit:
             if kept == fit.effects or len(kept) == known:
                 break
             fit = self.fitter.fit(kept, fit)
-        return _simplified(self.fitter, fit, known)
+        return simplified(self.fitter, fit, known)
 
 
-def _simplified(fitter: Fitter, fit: Fit, known: int) -> Fit:
+def simplified(fitter: Fitter, fit: Fit, known: int) -> Fit:
     """Returns the fit without amplitudes whose intervals hold null, if that is as good.
 
     Args:

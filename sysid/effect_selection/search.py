@@ -194,7 +194,9 @@ def _refit_search(
         first, last = exact.fit(()), exact.fit(reached.effects, reached)
     steps = selection.steps
     if few is not fitter and not fitter.base.costly:
-        steps = judged_by_all_rows(fitter, last, steps, deadline)
+        last, steps = judged_by_all_rows(fitter, library, last, steps, deadline)
+        if last.effects != reached.effects:
+            reached = few.fit(last.effects, last)
     is_complete = selection.is_complete and time.monotonic() < deadline
     _say(progress, f"comparing {len(library)} candidates with the effects")
     system = linear_system(few, reached, library, deadline)

@@ -8,6 +8,7 @@ from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
 
 _GRID = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+_SLOWEST = 2.0  # times as long as a log
 
 
 @register_effect
@@ -35,6 +36,19 @@ class SensorWarmUp(SensorEffect):
     is_of_time = True
     noun = "warm-up of the sensor"
     experiment = "a rest from switching on until the reading stays, pose unchanged"
+
+    @classmethod
+    def greatest_shapes(cls, duration: float) -> dict[str, float]:
+        """See Effect: what settles more slowly is a drift."""
+        return {"time_constant": _SLOWEST * duration}
+
+    @classmethod
+    def grids(cls, duration: float) -> dict[str, tuple[float, ...]]:
+        """See Effect: those that are no drift."""
+        slowest = _SLOWEST * duration
+        usual = tuple(value for value in _GRID if value < slowest)
+        ends = (slowest,) if slowest < _GRID[-1] else ()
+        return {"time_constant": (*usual, *ends)}
 
     def apply(self, wrench_S: Array, sensing: Sensing) -> Array:
         """Adds the offset at this time."""

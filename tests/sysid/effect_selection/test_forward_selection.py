@@ -169,5 +169,25 @@ def test_p_values_are_uniform_where_nothing_is_to_be_found(size):
 def test_of_fits_that_all_lose_the_one_that_loses_least_is_the_step():
     candidate = Candidate.of(JointCoulombFriction("shoulder"))
     term = Term((candidate,), np.arange(1), np.zeros(1, dtype=int))
-    losing = [Gain(term, share, np.full(8, share / 8)) for share in (-0.02, -0.3)]
+    one = np.ones(8)
+    losing = [Gain.of(term, one, times * one) for times in (1.02, 1.3)]
     assert step_of(losing, DEFAULT_SETTINGS).chosen is losing[0]
+
+
+def test_folds_in_which_nothing_is_explained_do_not_make_rivals() -> None:
+    """Half of the folds stay as they are: what the model gets wrong there."""
+    before = np.array([4.0, 4.0, 4.0, 4.0, 1.0, 1.0, 1.0, 1.0])
+    best, worse = before.copy(), before.copy()
+    best[4:], worse[4:] = 0.1, (0.13, 0.14, 0.15, 0.8)
+    term = Term(
+        (Candidate.of(JointCoulombFriction("shoulder")),), *np.zeros((2, 1), int)
+    )
+    gain, other = (Gain.of(term, before, after) for after in (best, worse))
+    assert gain.room == pytest.approx(0.4 / 20.0)
+    assert other.is_ambiguous_with(gain, DEFAULT_SETTINGS)  # 4 of 8 folds
+    worse[:4] = 4.01
+    other = Gain.of(term, before, worse)
+    assert not other.is_ambiguous_with(gain, DEFAULT_SETTINGS)
+    assert other.is_about_as_good_as(
+        Gain.of(term, before, worse - 1e-3), DEFAULT_SETTINGS
+    )

@@ -18,17 +18,25 @@ class Fits:
     """Fits whose effects each take away so much, and that take none twice."""
 
     settings = DEFAULT_SETTINGS
+    affordable = property(lambda self: self)
 
     def fit(self, effects, start=None):
         names = [each.name for each in effects]
         assert len(set(names)) == len(names)
         left = 100.0 - sum(_TAKEN[name] for name in names)
-        return SimpleNamespace(effects=effects, held_out_losses=np.full(4, left / 4.0))
+        return SimpleNamespace(
+            effects=effects,
+            held_out_losses=np.full(8, left / 8.0),
+            linearisation=SimpleNamespace(u=np.ones(6)),
+            null=np.zeros(6),
+            half_intervals=np.zeros(6),
+            columns_of=lambda effect: range(len(effect.fields)),
+        )
 
 
 def gain(effect, taken: float) -> Gain:
     term = Term((Candidate.of(effect),), np.zeros(1, int), np.zeros(1, int))
-    return Gain(term, taken, np.full(4, taken / 4.0))
+    return Gain.of(term, np.full(8, 0.125), np.full(8, 0.125 * (1.0 - taken)))
 
 
 def test_a_rival_stays_if_all_rows_leave_it_about_as_good() -> None:
@@ -38,6 +46,17 @@ def test_a_rival_stays_if_all_rows_leave_it_about_as_good() -> None:
     steps = [Step(bias, ()), Step(drift, (gain(SensorStep(), 0.1), again))]
     fits = Fits()
     last = fits.fit([*bias.term.candidates, *drift.term.candidates])
-    first, second = judged_by_all_rows(fits, last, steps, math.inf)
-    assert first is steps[0]
+    kept, (first, second) = judged_by_all_rows(fits, [], last, steps, math.inf)
+    assert kept is last and first is steps[0]
     assert [rival.term.names for rival in second.rivals] == [("SensorStep",)]
+
+
+def test_a_rival_that_all_rows_speak_for_is_chosen() -> None:
+    bias, drift = gain(SensorBias(), 0.8), gain(SensorDrift(), 0.3)
+    fits = Fits()
+    last = fits.fit(bias.term.candidates)
+    step = Step(bias, (drift, gain(SensorStep(), 0.8)))
+    kept, (judged,) = judged_by_all_rows(fits, [], last, [step], math.inf)
+    assert judged.chosen.term.names == ("SensorDrift",)
+    assert [rival.term.names for rival in judged.rivals] == [("SensorStep",)]
+    assert [effect.name for effect in kept.effects] == ["SensorDrift"]
