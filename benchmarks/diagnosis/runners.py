@@ -20,7 +20,7 @@ from sysid.diagnosis import (
     diagnose,
     twin_forecasts,
 )
-from sysid.diagnosis.station_subject import FIRST
+from sysid.diagnosis.station_subject import first_plans
 
 
 def ours(world: World, folder: Path, seconds: float) -> Answer:
@@ -56,13 +56,12 @@ def passive(world: World, folder: Path, seconds: float) -> Answer:
 
 
 def by_chance(world: World, folder: Path, seconds: float) -> Answer:
-    """Draws experiments that are safe without any effect."""
+    """Draws experiments that are safe without any effect, after the same first ones."""
     return _performed(world, folder, seconds, _drawn(world))
 
 
 def _drawn(world: World) -> Iterator[Plan]:
-    for number in range(FIRST):
-        yield Removal(seed=world.seed + number).plan(world.model)
+    yield from first_plans(world.model)
     kinds = [kind for kind in registered_experiments() if kind is not Removal]
     plans = [each.plan(world.model) for kind in kinds for each in kind.variants()]
     plans = [plan for plan in plans if plan.phases]

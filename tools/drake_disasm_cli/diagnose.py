@@ -1,6 +1,6 @@
 """Finds what a model lacks by the station's own experiments, and says when it knows.
 
-Records three removals and asks for the verdict, as close-loop does. Of the effects that
+Weighs, strokes and presses the bolt and asks for the verdict, as close-loop does. Of the effects that
 the verdict can't tell apart, or that its log could not have shown, the twin predicts
 what each would do in every experiment of the library; the experiment that separates
 them best per second of robot time is performed and added to the log, and the verdict is
