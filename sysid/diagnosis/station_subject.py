@@ -66,7 +66,8 @@ def first_plans(
     plans = [plan for plan in every if plan.phases]
     alone = [TwinRival(NOTHING, 1.0, 0.0, scenario)]
     known = twin_forecasts(plans, alone, limits, progress)
-    safe = [each.plan for each in known if not each.hazard]
+    pairs = zip(plans, known, strict=True)
+    safe = [plan for plan, forecast in pairs if not forecast.hazard]
     if not safe:
         raise DisasmError(f"no experiment is safe: {known[0].hazard}")
     return safe

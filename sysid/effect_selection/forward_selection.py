@@ -108,8 +108,8 @@ class Gain:
         """Returns whether folds can't distinguish this, which gains less, from another.
 
         Because it gains nearly as much, or more in so many folds that the difference is
-        chance (one-sided signed-rank test, Wilcoxon 1945: folds need not show an effect
-        alike, as long ones show a drift).
+        chance (one-sided signed-rank test, Wilcoxon 1945: a fold may show an effect
+        more than others do, as a long one shows a drift).
         """
         if self.is_about_as_good_as(other, settings):
             return True
