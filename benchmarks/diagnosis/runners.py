@@ -20,7 +20,7 @@ from sysid.diagnosis import (
     diagnose,
     twin_forecasts,
 )
-from sysid.diagnosis.station_subject import first_plans
+from sysid.diagnosis.station_subject import FIRST
 
 
 def ours(world: World, folder: Path, seconds: float) -> Answer:
@@ -56,12 +56,13 @@ def passive(world: World, folder: Path, seconds: float) -> Answer:
 
 
 def by_chance(world: World, folder: Path, seconds: float) -> Answer:
-    """Draws experiments that are safe without any effect, after the same first ones."""
+    """Draws experiments that are safe without any effect."""
     return _performed(world, folder, seconds, _drawn(world))
 
 
 def _drawn(world: World) -> Iterator[Plan]:
-    yield from first_plans(world.model)
+    for number in range(FIRST):
+        yield Removal(seed=world.seed + number).plan(world.model)
     kinds = [kind for kind in registered_experiments() if kind is not Removal]
     plans = [each.plan(world.model) for kind in kinds for each in kind.variants()]
     plans = [plan for plan in plans if plan.phases]

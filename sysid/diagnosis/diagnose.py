@@ -32,10 +32,10 @@ def diagnose(
 ) -> Diagnosis:
     """Finds out what a scenario's model lacks, by experiments on a station.
 
-    Performs a few short experiments, asks for the verdict, performs the experiment that
-    separates best what the verdict leaves, adds it to the log, and asks again, until
-    one hypothesis is left, no experiment would help, or the budget is spent. The same
-    call goes on where it was stopped.
+    Records some removals, asks for the verdict, performs the experiment that separates
+    best what the verdict leaves, adds it to the log, and asks again, until one
+    hypothesis is left, no experiment would help, or the budget is spent. The same call
+    goes on where it was stopped.
 
     Args:
         scenario: of the model, which the log states.

@@ -4,29 +4,16 @@ from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.progress import Progress, ignore_progress
+from drake_disasm.common.progress import Progress
 from drake_disasm.effects import Effect
-from drake_disasm.experiments import (
-    Experiment,
-    LoadedStrokes,
-    Plan,
-    Presses,
-    Removal,
-    SlowApproach,
-    Weighing,
-    registered_experiments,
-)
-from drake_disasm.safety import SafetyConfig
+from drake_disasm.experiments import Experiment, Plan, Removal, registered_experiments
 from drake_disasm.scenario import Scenario, scenario_to_mapping
 from sysid.diagnosis.design import Prediction, predict
 from sysid.diagnosis.growing_log import GrowingLog
 from sysid.diagnosis.in_contact import twin_forecasts
 from sysid.diagnosis.rivals import (
-    NOTHING,
     Need,
     Rival,
-    TwinRival,
     open_rivals,
     twin_rival,
     unseen_rivals,
@@ -35,42 +22,7 @@ from sysid.diagnosis.subject import Subject
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.workers import Workers
 
-# Before the first verdict: each for something else. Weighing begins with the only
-# removal: led by what the sensor reads, that jams the bolt where the reading is wrong,
-# and there a twin errs.
-_FIRST = (
-    Weighing(angle=0.1),
-    LoadedStrokes(way=0.1),
-    Presses(axis="z", places=1),
-    Presses(axis="y", places=1),
-    SlowApproach(speed=0.3),
-)
-
-
-def first_plans(
-    scenario: Scenario,
-    limits: SafetyConfig | None = None,
-    progress: Progress = ignore_progress,
-) -> list[Plan]:
-    """Returns what is performed before the first verdict.
-
-    Args:
-        scenario: of the model.
-        limits: at which the station holds, if it does.
-        progress: gets each simulation.
-
-    Raises:
-        DisasmError: none of it is safe where nothing is hidden.
-    """
-    every = [each.plan(scenario) for each in _FIRST]
-    plans = [plan for plan in every if plan.phases]
-    alone = [TwinRival(NOTHING, 1.0, 0.0, scenario)]
-    known = twin_forecasts(plans, alone, limits, progress)
-    pairs = zip(plans, known, strict=True)
-    safe = [plan for plan, forecast in pairs if not forecast.hazard]
-    if not safe:
-        raise DisasmError(f"no experiment is safe: {known[0].hazard}")
-    return safe
+FIRST = 3  # removals before the first verdict
 
 
 class StationSubject(Subject):
@@ -88,18 +40,17 @@ class StationSubject(Subject):
         self._scenario, self._log = scenario, log
         kinds = registered_experiments() if experiments is None else experiments
         self._kinds, self._progress = kinds, progress
-        self._first = first_plans(scenario, log.limits, progress)
 
     def first(self) -> list[Plan]:
         """See Subject."""
-        return self._first
+        seeds = [self._log.seed + number for number in range(FIRST)]
+        return [Removal(seed=seed).plan(self._scenario) for seed in seeds]
 
     def plans(self) -> list[Plan]:
         """See Subject: all that the scenario has anything to do with."""
-        first = {plan.text for plan in self._first}
         kinds = [kind for kind in self._kinds if kind is not Removal]
         plans = [e.plan(self._scenario) for kind in kinds for e in kind.variants()]
-        return [plan for plan in plans if plan.phases and plan.text not in first]
+        return [plan for plan in plans if plan.phases]
 
     def most(self, plan: Plan) -> float:
         """See Subject."""

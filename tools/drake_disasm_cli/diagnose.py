@@ -1,11 +1,11 @@
 """Finds what a model lacks by the station's own experiments, and says when it knows.
 
-Weighs, strokes and presses the bolt and asks for the verdict, as close-loop does. Of
-the effects that the verdict can't tell apart, or that its log could not have shown, the
-twin predicts what each would do in every experiment of the library; the experiment that
-separates them best per second of robot time is performed and added to the log, and the
-verdict is asked for again. It ends when one hypothesis is left, when no experiment
-would help, or when the robot time is spent.
+Records three removals and asks for the verdict, as close-loop does. Of the effects that
+the verdict can't tell apart, or that its log could not have shown, the twin predicts
+what each would do in every experiment of the library; the experiment that separates
+them best per second of robot time is performed and added to the log, and the verdict is
+asked for again. It ends when one hypothesis is left, when no experiment would help, or
+when the robot time is spent.
 
 An experiment is performed only if the twin keeps within 70 % of the task's force and
 torque, the workspace and the arm's joint limits under every hypothesis. Before each one

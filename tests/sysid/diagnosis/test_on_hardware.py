@@ -71,9 +71,9 @@ def test_an_arm_moves_within_the_limits_that_hold_hardware(tmp_path) -> None:
 
 
 def test_a_hold_keeps_the_rows_and_the_next_start_goes_on(tmp_path) -> None:
-    weak, drift = {"max_force": 6.0}, SensorDrift(fz=1.5)
+    weak = {"max_force": 1.0}
     with (
-        fake_hardware("removal", limits=weak, hidden=[drift]) as fake,
+        fake_hardware("removal", limits=weak) as fake,
         refused("is held", "force"),
     ):
         _diagnose(fake, tmp_path)
