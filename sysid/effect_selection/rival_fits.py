@@ -74,15 +74,15 @@ class _RivalFits:
             elif own:  # else the model has it already, and that was not enough
                 fits.append(self._fit(own))
                 gains.append(self._gain(rival, fits[-1]))
-        best = max(gains, key=lambda gain: gain.share)
-        if chosen.is_ambiguous_with(best, settings):
-            best = chosen
+        number = max(range(len(gains)), key=lambda i: gains[i].share)
+        if chosen.is_ambiguous_with(gains[number], settings):
+            number = 0
+        best, fit = gains[number], fits[number]
         rivals = [
             gain
             for gain in gains
             if gain is not best and gain.is_ambiguous_with(best, settings)
         ]
-        fit = fits[gains.index(best)]
         if best is not chosen:
             fit = simplified(self._fitter, fit, len(self._others))
         return fit, Step(best, (*rivals, *late))

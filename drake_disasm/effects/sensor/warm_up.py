@@ -45,7 +45,7 @@ class SensorWarmUp(SensorEffect):
     @classmethod
     def grids(cls, duration: float) -> dict[str, tuple[float, ...]]:
         """See Effect: those that are no drift."""
-        slowest = _SLOWEST * duration
+        slowest = cls.greatest_shapes(duration)["time_constant"]
         usual = tuple(value for value in _GRID if value < slowest)
         ends = (slowest,) if slowest < _GRID[-1] else ()
         return {"time_constant": (*usual, *ends)}
