@@ -1,5 +1,7 @@
 """Hidden worlds: a cell that lacks nothing, or one effect that its model does not have.
 
+Models have IMPACT contact, about as stiff as the cell's.
+
 A world is drawn from its group and its number alone. Of effects of the library,
 sizes are such that the true model takes away a quarter to nine tenths of the loss of
 two removals of a door chain; a delay takes away nothing there.
@@ -15,6 +17,7 @@ import numpy as np
 from diagnosis.unknown_effects import UNKNOWN
 from drake_disasm.effects import Effect, find_effect, registered_effects
 from drake_disasm.scenario import Scenario, load_scenario
+from sysid.models.twin import with_impact_as_stiff
 
 #: Effects that logs of removals leave ambiguous.
 PAIRS = (
@@ -159,8 +162,7 @@ def _drawn(
     turn: int,
     random: np.random.Generator,
 ) -> World:
-    model = load_scenario(part)
-    model.contact.model = "impact"
+    model = with_impact_as_stiff(load_scenario(part))
     if kind == "null":
         return World(group, number, model, ())
     if kind == "missing":

@@ -89,10 +89,10 @@ _ACTING, _THREE = _SIX + 60, _SIX + 66
 )
 (_SLIP, _BY_TWIST, _PLACES) = (_THREE + 30 + place for place in (0, 3, 21))
 #: ... of the places (k,): how deep they are, how fast they go in, which normal force
-#: lagged friction is of; (k, 3) arms from To, normals out of the fixed body, and
-#: arm x normal, in G.
-(DEPTH, _INWARD, PRESSED, ARM, NORMAL, MOMENT, SIZE) = (
-    _PLACES + PLACES * place for place in (0, 1, 2, 3, 6, 9, 12)
+#: lagged friction is of, their law's stiffness and exponent; (k, 3) arms from To,
+#: normals out of the fixed body, and arm x normal, in G.
+(DEPTH, _INWARD, PRESSED, STIFFNESS, EXPONENT, ARM, NORMAL, MOMENT, SIZE) = (
+    _PLACES + PLACES * place for place in (0, 1, 2, 3, 4, 5, 8, 11, 14)
 )
 
 
@@ -542,7 +542,7 @@ def _by_rounds(h: float, w: np.ndarray) -> bool:
 
     Without a solution for given forces, twist and wrench are left as they are.
     """
-    last, law = _BEFORE, (w[LAW], w[LAW + 1], w[LAW + 2], w[LAW + 3])
+    last = _BEFORE
     _copy(TWIST, last, 6, w)
     _copy(W, _LAST_W, 6, w)
     is_solved = False
@@ -560,7 +560,7 @@ def _by_rounds(h: float, w: np.ndarray) -> bool:
         _set_inward(last, w)
         for k in range(PLACES):
             rate = w[_INWARD + k]
-            F, _, _ = normal_force(w[DEPTH + k] + h * rate, rate, law)
+            F, _, _ = normal_force(w[DEPTH + k] + h * rate, rate, _law(k, w))
             w[PRESSED + k] = 0.5 * (w[PRESSED + k] + F) if is_solved else F
         is_solved = True
     _copy(last, TWIST, 6, w)
@@ -610,14 +610,14 @@ def _add_contacts(
 ) -> None:
     """Adds the forces at all places to the wrench, their changes by the twist to the
     slope; see `balance`."""
-    law, mu = (w[LAW], w[LAW + 1], w[LAW + 2], w[LAW + 3]), w[FRICTION]
+    mu = w[FRICTION]
     _set_inward(twist, w)
     for k in range(PLACES):
         rate = w[_INWARD + k]
         after = w[DEPTH + k] + h * rate
         if after <= 0.0 and not (is_lagged and w[PRESSED + k] > 0.0):
             continue
-        F, by_depth, by_rate = normal_force(after, rate, law)
+        F, by_depth, by_rate = normal_force(after, rate, _law(k, w))
         dF = h * by_depth + by_rate
         limit, limit_by_rate = mu * F, mu * dF
         if is_lagged:
@@ -802,6 +802,12 @@ def _copy(one: int, other: int, size: int, w: np.ndarray) -> None:
 
 
 @compiled
+def _law(k: int, w: np.ndarray) -> tuple[float, float, float, float]:
+    """Returns the law at a place, by its number; see `normal_force`."""
+    return w[STIFFNESS + k], w[EXPONENT + k], w[LAW + 2], w[LAW + 3]
+
+
+@compiled
 def normal_force(
     penetration: float, rate: float, law: tuple[float, float, float, float]
 ) -> tuple[float, float, float]:
@@ -831,13 +837,16 @@ def find_places(w: np.ndarray) -> None:
     """Finds the places where the moved and the fixed body could touch.
 
     Sets how deep they are in each other [m], negative where there is a gap, arms from
-    Bo to the places, and normals, in G; and the torque of the part's spring.
+    Bo to the places, and normals, in G; the law at each; and the torque of the part's
+    spring.
 
     Args:
         w: workspace, with R_GB and p_GBo, and a row of `Gaps`.
     """
     for j in range(3):
         w[SPRING + j] = 0.0
+    for k in range(PLACES):
+        w[STIFFNESS + k], w[EXPONENT + k] = w[LAW], w[LAW + 1]
     kind = w[GAPS]
     if kind == SLOT:
         _find_slot(w)
@@ -875,21 +884,101 @@ def _find_slot(w: np.ndarray) -> None:
     if py + bottom * uy >= lip:  # the head is above the plate
         for k in range(4, _PLANES):
             w[DEPTH + k] = -1.0
-    xx, yx, zx = w[R_GB], w[R_GB + 3], w[R_GB + 6]
-    xz, yz, zz = w[R_GB + 2], w[R_GB + 5], w[R_GB + 8]
+    play = (under_lip - floor) - (top - bottom)
+    tilt = max(math.sqrt(ux * ux + uz * uz), play / (4.0 * head))
     for i in range(_RIM_POINTS):
-        above, below = _PLANES + i, _PLANES + _RIM_POINTS + i
-        along, across = _RIM[i, 0], _RIM[i, 1]
-        x = head * (xx * along + xz * across)
-        y = head * (yx * along + yz * across)
-        z = head * (zx * along + zz * across)
-        depth = floor - (py + (y + bottom * uy))
-        _put(below, depth, x + bottom * ux, y + bottom * uy, z + bottom * uz, w)
-        x, y, z = x + top * ux, y + top * uy, z + top * uz
-        is_covered = px + x < lips_end and abs(pz + z) > slot
-        is_inside = py + y < under_lip + head  # not yet lifted out
-        depth = py + y - under_lip if is_covered and is_inside else -1.0
-        _put(above, depth, x, y, z, w)
+        below, above = _PLANES + _RIM_POINTS + i, _PLANES + i
+        along, across = head * _RIM[i, 0], head * _RIM[i, 1]
+        _off_axis(below, along, bottom, across, w)
+        w[DEPTH + below] = floor - py - w[ARM + 3 * below + 1]
+        _lean_on_edge(below, along, bottom, across, tilt, w)
+        is_corner = i % 2 == 1
+        if is_corner:  # where a lip's edge cuts the rim
+            across = math.copysign(slot, across) - pz
+            reach = math.sqrt(max(0.0, head * head - across * across))
+            along = math.copysign(reach, along)
+        _off_axis(above, along, top, across, w)
+        x, y = px + w[ARM + 3 * above], py + w[ARM + 3 * above + 1]
+        is_covered = x < lips_end and (is_corner or abs(pz + across) > slot)
+        is_inside = y < under_lip + head  # not yet lifted out
+        w[DEPTH + above] = y - under_lip if is_covered and is_inside else -1.0
+        if is_corner:
+            _lean_on_corner(above, along, top, across, tilt, w)
+        else:
+            _lean_on_edge(above, along, top, across, tilt, w)
+
+
+@compiled
+def _off_axis(
+    k: int, along: float, height: float, across: float, w: np.ndarray
+) -> None:
+    """Sets a place's arm to a point of a round body, wherever that is turned about y_B.
+
+    Args:
+        k: number of the place.
+        along, across: from its axis, where it is not tilted along x and z of G [m].
+        height: along its axis [m].
+        w: workspace.
+    """
+    ux, uy, uz = w[R_GB + 1], w[R_GB + 4], w[R_GB + 7]
+    n, arm = math.sqrt(ux * ux + uy * uy), ARM + 3 * k
+    w[arm] = height * ux + (along * uy - across * ux * uz) / n
+    w[arm + 1] = height * uy - (along * ux + across * uy * uz) / n
+    w[arm + 2] = height * uz + across * n
+
+
+@compiled
+def _lean_on_edge(
+    k: int, along: float, height: float, across: float, tilt: float, w: np.ndarray
+) -> None:
+    """Sets the law where the head leans on a face with its edge, and where it presses.
+
+    The law's stiffness is that of a wall as high as the head, t, is thick. A face is an
+    elastic foundation: the pressure at depth p is k p^e / t^2. Depth falls from d at
+    the edge by the tilt times the way s inwards, and there the head is 2 (2 R s)^(1/2)
+    wide, so F = 2 (2 R)^(1/2) B(e + 1, 3/2) k / t^2 d^(e + 3/2) / tilt^(3/2).
+
+    Args:
+        k: number of the place.
+        along, height, across: of the edge, see `_off_axis` [m].
+        tilt: [rad].
+        w: workspace, with the depth.
+    """
+    e, head = w[LAW + 1], w[GAPS + 10]
+    beta = math.gamma(e + 1.0) * math.gamma(1.5) / math.gamma(e + 2.5)
+    width = 2.0 * math.sqrt(2.0 * head * _MM) * beta
+    w[STIFFNESS + k] = _foundation(w) * width / tilt**1.5
+    w[EXPONENT + k] = e + 1.5
+    if w[DEPTH + k] > 0.0:
+        inwards = 1.5 / (e + 2.5) * w[DEPTH + k] / tilt
+        share = max(0.0, 1.0 - inwards / head)
+        _off_axis(k, share * along, height, share * across, w)
+
+
+@compiled
+def _lean_on_corner(
+    k: int, along: float, height: float, across: float, tilt: float, w: np.ndarray
+) -> None:
+    """Sets the same where a lip cuts the rim; see `_lean_on_edge`.
+
+    There the head is m s wide, so F = m B(e + 1, 2) k / t^2 d^(e + 2) / tilt^2.
+    """
+    e = w[LAW + 1]
+    wide = abs(along) / max(abs(across), 1e-6)
+    w[STIFFNESS + k] = _foundation(w) * wide / ((e + 1.0) * (e + 2.0) * tilt**2)
+    w[EXPONENT + k] = e + 2.0
+    if w[DEPTH + k] > 0.0:
+        inwards = min(2.0 / (e + 3.0) * w[DEPTH + k] / tilt, abs(along))
+        x = along - math.copysign(inwards, along)
+        z = across + math.copysign(0.5 * wide * inwards, across)
+        _off_axis(k, x, height, z, w)
+
+
+@compiled
+def _foundation(w: np.ndarray) -> float:
+    """Returns the pressure of the head's faces at a depth of 1 mm [N/mm^2]."""
+    thickness = (w[GAPS + 11] - w[GAPS + 12]) * _MM
+    return float(w[LAW] / thickness**2)
 
 
 @compiled
