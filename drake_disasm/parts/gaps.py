@@ -39,8 +39,8 @@ class Gaps(abc.ABC):
 class SlotGaps(Gaps):
     """A bolt with neck and head in a slot with a channel under it.
 
-    The neck is a circle at either edge of the lips, the head a disc in its channel. The
-    groove's normals are along its axes.
+    The neck is a circle at either edge of the lips, the head a disc in its channel,
+    whose edge gives when it is tilted. The groove's normals are along its axes.
 
     Attributes:
         slot, wall: half widths of slot and channel [m].

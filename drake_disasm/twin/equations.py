@@ -886,12 +886,13 @@ def _find_slot(w: np.ndarray) -> None:
             w[DEPTH + k] = -1.0
     play = (under_lip - floor) - (top - bottom)
     tilt = max(math.sqrt(ux * ux + uz * uz), play / (4.0 * head))
+    edge = _edge_stiffness(tilt, w)
     for i in range(_RIM_POINTS):
         below, above = _PLANES + _RIM_POINTS + i, _PLANES + i
         along, across = head * _RIM[i, 0], head * _RIM[i, 1]
         _off_axis(below, along, bottom, across, w)
         w[DEPTH + below] = floor - py - w[ARM + 3 * below + 1]
-        _lean_on_edge(below, along, bottom, across, tilt, w)
+        _lean_on_edge(below, along, bottom, across, tilt, edge, w)
         is_corner = i % 2 == 1
         if is_corner:  # where a lip's edge cuts the rim
             across = math.copysign(slot, across) - pz
@@ -905,14 +906,14 @@ def _find_slot(w: np.ndarray) -> None:
         if is_corner:
             _lean_on_corner(above, along, top, across, tilt, w)
         else:
-            _lean_on_edge(above, along, top, across, tilt, w)
+            _lean_on_edge(above, along, top, across, tilt, edge, w)
 
 
 @compiled
 def _off_axis(
     k: int, along: float, height: float, across: float, w: np.ndarray
 ) -> None:
-    """Sets a place's arm to a point of a round body, wherever that is turned about y_B.
+    """Sets a place's arm to a point of a round body, however that is turned about y_B.
 
     Args:
         k: number of the place.
@@ -928,30 +929,48 @@ def _off_axis(
 
 
 @compiled
-def _lean_on_edge(
-    k: int, along: float, height: float, across: float, tilt: float, w: np.ndarray
-) -> None:
-    """Sets the law where the head leans on a face with its edge, and where it presses.
+def _edge_stiffness(tilt: float, w: np.ndarray) -> float:
+    """Returns the stiffness of the head's edge on a face [N/mm^(e + 3/2)].
 
-    The law's stiffness is that of a wall as high as the head, t, is thick. A face is an
-    elastic foundation: the pressure at depth p is k p^e / t^2. Depth falls from d at
+    The law's stiffness k is that of a wall as high as the head, t, is thick. A face is
+    an elastic foundation: its pressure at depth p is k p^e / t^2. Depth falls from d at
     the edge by the tilt times the way s inwards, and there the head is 2 (2 R s)^(1/2)
     wide, so F = 2 (2 R)^(1/2) B(e + 1, 3/2) k / t^2 d^(e + 3/2) / tilt^(3/2).
+
+    Args:
+        tilt: [rad].
+        w: workspace, with the law and the gaps.
+    """
+    e, head = w[LAW + 1], w[GAPS + 10]
+    beta = math.gamma(e + 1.0) * math.gamma(1.5) / math.gamma(e + 2.5)
+    width = 2.0 * math.sqrt(2.0 * head * _MM)
+    return float(_foundation(w) * width * beta / tilt**1.5)
+
+
+@compiled
+def _lean_on_edge(
+    k: int,
+    along: float,
+    height: float,
+    across: float,
+    tilt: float,
+    stiffness: float,
+    w: np.ndarray,
+) -> None:
+    """Sets the law where the head leans on a face with its edge, and where it presses.
 
     Args:
         k: number of the place.
         along, height, across: of the edge, see `_off_axis` [m].
         tilt: [rad].
+        stiffness: see `_edge_stiffness`.
         w: workspace, with the depth.
     """
-    e, head = w[LAW + 1], w[GAPS + 10]
-    beta = math.gamma(e + 1.0) * math.gamma(1.5) / math.gamma(e + 2.5)
-    width = 2.0 * math.sqrt(2.0 * head * _MM) * beta
-    w[STIFFNESS + k] = _foundation(w) * width / tilt**1.5
-    w[EXPONENT + k] = e + 1.5
+    e = w[LAW + 1]
+    w[STIFFNESS + k], w[EXPONENT + k] = stiffness, e + 1.5
     if w[DEPTH + k] > 0.0:
         inwards = 1.5 / (e + 2.5) * w[DEPTH + k] / tilt
-        share = max(0.0, 1.0 - inwards / head)
+        share = max(0.0, 1.0 - inwards / w[GAPS + 10])
         _off_axis(k, share * along, height, share * across, w)
 
 
@@ -962,6 +981,12 @@ def _lean_on_corner(
     """Sets the same where a lip cuts the rim; see `_lean_on_edge`.
 
     There the head is m s wide, so F = m B(e + 1, 2) k / t^2 d^(e + 2) / tilt^2.
+
+    Args:
+        k: number of the place.
+        along, height, across: of the corner, see `_off_axis` [m].
+        tilt: [rad].
+        w: workspace, with the depth.
     """
     e = w[LAW + 1]
     wide = abs(along) / max(abs(across), 1e-6)

@@ -17,7 +17,11 @@ from drake_disasm.free_motion.arm_space import ArmSpace
 from drake_disasm.logs import LogHeader
 from sysid.diagnosis.arm_log import KINDS, Arm, GrowingArmLog
 from sysid.diagnosis.design import Prediction, is_enough, predict
-from sysid.diagnosis.in_free_space import ArmRival, arm_forecasts
+from sysid.diagnosis.in_free_space import (
+    ArmRival,
+    arm_forecasts,
+    hazard_without_effects,
+)
 from sysid.diagnosis.loop import DEFAULT_BUDGET, Budget, Confirm, Diagnosis, pursue
 from sysid.diagnosis.rivals import NOTHING, Need, Rival, open_rivals
 from sysid.diagnosis.subject import Subject
@@ -94,6 +98,10 @@ class ArmSubject(Subject):
     def first(self) -> list[JointPlan]:
         """See Subject."""
         return [JointExcitation().plan(self._log.space)]
+
+    def hazard(self, plan: JointPlan) -> str:
+        """See Subject."""
+        return hazard_without_effects(plan, self._log.header, self._log.space)
 
     def plans(self) -> list[JointPlan]:
         """See Subject."""

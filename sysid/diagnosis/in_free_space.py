@@ -15,10 +15,10 @@ from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progre
 from drake_disasm.experiments import JointPlan
 from drake_disasm.free_motion.arm_space import ArmSpace
 from drake_disasm.free_motion.table import MotionTable
-from drake_disasm.logs import Episode, Log
+from drake_disasm.logs import Episode, Log, LogHeader
 from drake_disasm.logs.columns import flat_columns
 from sysid.diagnosis.design import Forecast
-from sysid.diagnosis.rivals import Rival, varied_parameters
+from sysid.diagnosis.rivals import NOTHING, Rival, varied_parameters
 from sysid.fitting.candidates import Candidate, extended
 from sysid.fitting.fit import Fit
 from sysid.models.base import Array, LogModel
@@ -108,7 +108,7 @@ def arm_forecasts(
                 channel.unit,
                 [own[:, i] for own in first],
                 _period(log),
-                _hazard(plan, torques, rivals, space),
+                _hazard(plan, torques, [rival.name for rival in rivals], space),
             )
         )
     return found
@@ -121,13 +121,30 @@ def _torques(log: Log, motion: MotionTable, predicted: Array) -> Array:
     """
     if log.header.kind == "joint_motion":
         return predicted
-    arm = ArmRegressor(str(log.header.urdf), log.header.joints)
-    own = arm.torques(*_states(motion, motion.time))
+    own = _torques_of_urdf(log.header, motion)
     return np.repeat(own[None], len(predicted), axis=0)
 
 
+def _torques_of_urdf(header: LogHeader, motion: MotionTable) -> Array:
+    """Returns the joints' torques (n, joints) that a motion takes by the URDF."""
+    arm = ArmRegressor(str(header.urdf), header.joints)
+    return np.asarray(arm.torques(*_states(motion, motion.time)))
+
+
+def hazard_without_effects(plan: JointPlan, header: LogHeader, space: ArmSpace) -> str:
+    """Returns why an experiment is not safe by the URDF; empty if it is.
+
+    Args:
+        plan: of it.
+        header: of the recordings.
+        space: limits of the arm.
+    """
+    torques = _torques_of_urdf(header, plan.motion)
+    return _hazard(plan, torques[None], [NOTHING], space)
+
+
 def _hazard(
-    plan: JointPlan, torques: Array, rivals: Sequence[ArmRival], space: ArmSpace
+    plan: JointPlan, torques: Array, rivals: Sequence[str], space: ArmSpace
 ) -> str:
     """Returns why an experiment is not performed; empty if it may be."""
     if np.ptp(plan.motion.q, axis=0).max() < _LEAST:
@@ -137,7 +154,7 @@ def _hazard(
     if share[k, joint] <= _MARGIN:
         return ""
     return (
-        f"under {rivals[int(k)].name} {space.limits.names[int(joint)]} takes "
+        f"under {rivals[int(k)]} {space.limits.names[int(joint)]} takes "
         f"{np.abs(torques[k, :, joint]).max():.1f} N m, above {100 * _MARGIN:.0f} % of "
         "what is allowed"
     )

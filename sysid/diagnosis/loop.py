@@ -296,6 +296,11 @@ class _Session:
                     f"budget: {budget.robot:g} s are spent before the first verdict; "
                     "give more"
                 )
+            if hazard := subject.hazard(plan):
+                raise DisasmError(
+                    f"{plan.text}, before the first verdict, is not performed: "
+                    f"{hazard}; change what the scenario says of it"
+                )
             if not confirm(f"{plan.text}: at most {subject.most(plan):.0f} s"):
                 raise DisasmError("stopped by hand before the first verdict")
             self.first_time += subject.log.perform(plan).duration

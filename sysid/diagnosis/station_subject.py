@@ -12,8 +12,10 @@ from sysid.diagnosis.design import Prediction, predict
 from sysid.diagnosis.growing_log import GrowingLog
 from sysid.diagnosis.in_contact import twin_forecasts
 from sysid.diagnosis.rivals import (
+    NOTHING,
     Need,
     Rival,
+    TwinRival,
     open_rivals,
     twin_rival,
     unseen_rivals,
@@ -45,6 +47,13 @@ class StationSubject(Subject):
         """See Subject."""
         seeds = [self._log.seed + number for number in range(FIRST)]
         return [Removal(seed=seed).plan(self._scenario) for seed in seeds]
+
+    def hazard(self, plan: Plan) -> str:
+        """See Subject."""
+        alone = [TwinRival(NOTHING, 1.0, 0.0, self._scenario)]
+        limits = self._log.limits
+        (found,) = twin_forecasts([plan], alone, limits, self._progress)
+        return found.hazard
 
     def plans(self) -> list[Plan]:
         """See Subject: all that the scenario has anything to do with."""

@@ -45,6 +45,10 @@ class Subject(abc.ABC):
         """Returns what is performed before the first verdict."""
 
     @abc.abstractmethod
+    def hazard(self, plan: Any) -> str:
+        """Returns why that is not safe under the model as it is; empty if it is."""
+
+    @abc.abstractmethod
     def plans(self) -> Sequence[Any]:
         """Returns the experiments to choose from."""
 

@@ -9,9 +9,11 @@ from drake_disasm.twin.equations import (
     ARM,
     BAYONET,
     DEPTH,
+    EXPONENT,
     GAPS,
     GAPS_SIZE,
     HOLE,
+    LAW,
     NORMAL,
     P_GBO,
     PLACES,
@@ -19,16 +21,21 @@ from drake_disasm.twin.equations import (
     SIZE,
     SLOT,
     SPRING,
+    STIFFNESS,
     find_places,
+    normal_force,
 )
+from drake_disasm.twin.law import ImpactLaw
 
 MM = 1e-3
+IMPACT = ImpactLaw(stiffness=160.0, exponent=1.3, damping=0.0, depth=0.1)
 
 
 def found_places(part, R, p):
     """Returns the workspace of a part whose moved body is at X_GB = (R, p)."""
     w = np.full(SIZE, np.nan)
-    for place, numbers in ((GAPS, part.gaps.row), (R_GB, R), (P_GBO, p)):
+    known = ((LAW, IMPACT.row), (GAPS, part.gaps.row), (R_GB, R), (P_GBO, p))
+    for place, numbers in known:
         w[place : place + np.size(numbers)] = np.ravel(numbers)
     find_places(w)
     return w
@@ -89,6 +96,72 @@ def test_a_quarter_turn_changes_nothing_for_a_round_bolt():
     np.testing.assert_allclose(np.sort(turned[0]), np.sort(straight[0]), atol=1e-12)
     lengths = (np.sort(np.linalg.norm(each[1], axis=1)) for each in (straight, turned))
     np.testing.assert_allclose(*lengths)
+
+
+TILT = 0.06
+
+
+def pressed_at(R, p, normal):
+    """Returns force and its centre from Bo [mm] of a head that leans on a face."""
+    w = found_places(DoorChain(), R, p)
+    depth, stiffness, exponent = (
+        w[at : at + PLACES] for at in (DEPTH, STIFFNESS, EXPONENT)
+    )
+    arms, normals = (w[at : at + 3 * PLACES].reshape(-1, 3) for at in (ARM, NORMAL))
+    touches = (depth > 0) & (normals @ normal > 0.5)
+    laws = zip(depth[touches], stiffness[touches], exponent[touches], strict=True)
+    force = np.array([normal_force(d, 0.0, (k, e, 0.0, 0.1))[0] for d, k, e in laws])
+    return force.sum(), force @ arms[touches] / force.sum() / MM
+
+
+def foundation(depth, area):
+    """Returns force and its centre [mm] of an elastic foundation.
+
+    Args:
+        depth: of x and z in B [mm], on whatever of the head there is.
+        area: whether a point of x and z is on it.
+    """
+    part = DoorChain()
+    side = np.linspace(-5.0, 5.0, 2001)
+    x, z = np.meshgrid(side, side, indexing="ij")
+    k = IMPACT.stiffness / (part.head_thickness / MM) ** 2
+    is_on = (np.hypot(x, z) < 5.0) & area(x, z)
+    p = k * np.where(is_on, np.maximum(depth(x, z), 0.0), 0.0) ** IMPACT.exponent
+    p *= (side[1] - side[0]) ** 2
+    return p.sum(), np.array([(p * x).sum(), (p * z).sum()]) / p.sum()
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+@pytest.mark.parametrize("axis", ["x", "z"])
+def test_a_tilted_head_leans_on_its_edge_as_on_an_elastic_foundation(axis, turn):
+    """However it is turned about its own axis."""
+    gaps, deep = DoorChain().gaps, 0.04
+    make = getattr(RotationMatrix, f"Make{axis.upper()}Rotation")
+    R = (make(TILT) @ RotationMatrix.MakeYRotation(turn)).matrix()
+    y = gaps.floor - gaps.bottom * np.cos(TILT) + gaps.head * np.sin(TILT)
+    force, centre = pressed_at(R, [0.03, y - deep * MM, 0.0], [0.0, 1.0, 0.0])
+
+    def depth(x, z):
+        return deep - TILT * (5.0 + (x if axis == "z" else -z))
+
+    expected, (x, z) = foundation(depth, lambda x, z: x < np.inf)
+    assert force == pytest.approx(expected, rel=0.05)
+    bottom = R @ [0.0, gaps.bottom / MM, 0.0]
+    np.testing.assert_allclose(centre[[0, 2]] - bottom[[0, 2]], [x, z], atol=0.02)
+
+
+def test_a_tilted_head_leans_on_the_corners_that_the_slot_leaves():
+    gaps, deep = DoorChain().gaps, 0.03
+    R = RotationMatrix.MakeZRotation(TILT).matrix()
+    corner = np.sqrt(5.0**2 - (gaps.slot / MM) ** 2)
+    y = gaps.under_lip - gaps.top * np.cos(TILT) - corner * MM * np.sin(TILT)
+    force, centre = pressed_at(R, [0.03, y + deep * MM, 0.0], [0.0, -1.0, 0.0])
+    expected, (x, _) = foundation(
+        lambda x, z: deep - TILT * (corner - x), lambda x, z: abs(z) > gaps.slot / MM
+    )
+    assert force == pytest.approx(expected, rel=0.15)  # its rim is taken for straight
+    top = R @ [0.0, gaps.top / MM, 0.0]
+    np.testing.assert_allclose(centre[[0, 2]] - top[[0, 2]], [x, 0.0], atol=0.05)
 
 
 def test_another_clearance_is_the_lock_s_with_that_clearance():

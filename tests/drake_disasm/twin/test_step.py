@@ -122,6 +122,8 @@ def touching(random):
     part(w, equations.NORMAL, 3 * count)[:] = np.ravel(normals)
     equations.set_moments(w)
     part(w, equations.LAW, 4)[:] = TURNED.law.row
+    part(w, equations.STIFFNESS, count)[:] = TURNED.law.stiffness
+    part(w, equations.EXPONENT, count)[:] = TURNED.law.exponent
     part(w, equations.A, 36)[:] = np.ravel(M + H * np.diag(D))
     part(w, equations.B, 6)[:], w[equations.FRICTION] = 0.0, 0.2
     return w

@@ -46,7 +46,7 @@ class Pendulum:
         holds_at: int = -1,
     ) -> None:
         self.urdf = str(write_pendulum(folder / "pendulum.urdf"))
-        self._effects, self._holds_at, self._played = effects, holds_at, 0
+        self._effects, self._holds_at, self.played = effects, holds_at, 0
         self._is_held, self._is_stiff = False, is_stiff
         limits = JointLimits((JOINT,), *np.array([[-2.5], [2.5], [4.0], [10.0], [5.0]]))
         collisions = CollisionFreeSpace(self.urdf, (JOINT,), limits)
@@ -71,11 +71,11 @@ class Pendulum:
         """See Arm."""
         self.check()
         time = PERIOD * np.arange(int(motion.time[-1] / PERIOD) + 1)
-        if self._played == self._holds_at:
+        if self.played == self._holds_at:
             time, self._is_held = time[: len(time) // 2], True
-        self._played += 1
+        self.played += 1
         goal = CubicSpline(motion.time, motion.q, bc_type="clamped")
-        random = np.random.default_rng(self._played)
+        random = np.random.default_rng(self.played)
         commanded = goal(time)
         q = commanded
         if not self._is_stiff:

@@ -1,5 +1,6 @@
 """An arm in free space finds out what its model lacks: a simulated pendulum."""
 
+import dataclasses
 import html
 from functools import partial
 from pathlib import Path
@@ -49,6 +50,15 @@ def test_it_ends_with_what_is_hidden(tmp_path: Path, kind: str) -> None:
     with refused("another kind"):
         other = {"joint_motion": "joint_response", "joint_response": "joint_motion"}
         told(arm, tmp_path / "out", kind=other[kind])
+
+
+def test_the_first_motion_is_looked_at_by_the_urdf(tmp_path: Path) -> None:
+    arm = Pendulum(tmp_path, DRY)
+    weak = dataclasses.replace(arm.space.limits, effort=np.array([1e-3]))
+    arm.space = dataclasses.replace(arm.space, limits=weak)
+    with refused("is not performed", "servo takes", "of what is allowed"):
+        told(arm, tmp_path / "out")
+    assert not arm.played
 
 
 def rivals(**values: float) -> list[ArmRival]:

@@ -44,7 +44,7 @@ def test_it_ends_with_what_is_hidden(warm) -> None:
     performed = [each for each in found.rounds if each.experiment]
     assert len(episodes) == 3 + len(performed)
     for each in performed:
-        assert each.force < 14.0 and each.distance >= 5.0 and len(each.rivals) > 1
+        assert each.force < 14.0 and each.distance > 4.0 and len(each.rivals) > 1
         assert set(each.predicted) == set(each.rivals)
 
 
@@ -100,3 +100,10 @@ def test_a_person_may_say_no_and_a_budget_may_be_too_small(tmp_path: Path) -> No
     assert "Removal" in asked[0]
     with refused("budget", "before the first verdict"):
         diagnose(IMPACT, tmp_path / "few", station="twin", budget=Budget(1.0))
+
+
+def test_the_first_recording_is_run_on_the_twin_before(tmp_path: Path) -> None:
+    weak = load_scenario("removal", ["contact.model=impact", "task.reward.f_max=1"])
+    with refused("Removal", "is not performed", "under nothing it"):
+        diagnose(weak, tmp_path, station="twin", **FEW)
+    assert not list((tmp_path / "log").glob("*.parquet"))
