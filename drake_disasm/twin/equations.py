@@ -19,6 +19,7 @@ from drake_disasm.common.compiled import compiled
 
 _MM = 1000.0
 _LEAST = 1e-12  # mm: a power of zero has no slope
+_DEEP = 1e-6  # m: what touches by less is looked at as if it were as deep
 _STICTION = 1e-4  # m/s: creep at which friction is three quarters
 _ITERATIONS = 60
 _SHORTEST = 11  # times that a step is halved before it is given up
@@ -980,7 +981,8 @@ def _lean_on_corner(
 ) -> None:
     """Sets the same where a lip cuts the rim; see `_lean_on_edge`.
 
-    There the head is m s wide, so F = m B(e + 1, 2) k / t^2 d^(e + 2) / tilt^2.
+    There the head is m s wide, so F = m B(e + 1, 2) k / t^2 d^(e + 2) / tilt^2, with m
+    as it is on the way to the centre of pressure.
 
     Args:
         k: number of the place.
@@ -988,14 +990,15 @@ def _lean_on_corner(
         tilt: [rad].
         w: workspace, with the depth.
     """
-    e = w[LAW + 1]
-    wide = abs(along) / max(abs(across), 1e-6)
-    w[STIFFNESS + k] = _foundation(w) * wide / ((e + 1.0) * (e + 2.0) * tilt**2)
+    e, head, far = w[LAW + 1], w[GAPS + 10], abs(along)
+    inwards = min(2.0 / (e + 3.0) * max(w[DEPTH + k], _DEEP) / tilt, far)
+    width = math.sqrt(head**2 - (far - inwards) ** 2) - abs(across)
+    slope = width / inwards if inwards > 0.0 else 0.0
+    w[STIFFNESS + k] = _foundation(w) * slope / ((e + 1.0) * (e + 2.0) * tilt**2)
     w[EXPONENT + k] = e + 2.0
     if w[DEPTH + k] > 0.0:
-        inwards = min(2.0 / (e + 3.0) * w[DEPTH + k] / tilt, abs(along))
         x = along - math.copysign(inwards, along)
-        z = across + math.copysign(0.5 * wide * inwards, across)
+        z = across + math.copysign(0.5 * width, across)
         _off_axis(k, x, height, z, w)
 
 
