@@ -343,22 +343,22 @@ def _model_error(log: Log, sensing: SensorReading, head: float) -> Array:
     found[:, :3], found[:, 3:6] = POSE_ERROR
     found[:, 6:9] = force[:, None]
     found[:, 9:] = force[:, None] * across
-    return np.hypot(found, _lost_at_the_end(log))
+    lost = [_lost_at_the_end(episode, sensing) for episode in log.episodes]
+    return np.hypot(found, np.concatenate(lost))
 
 
-def _lost_at_the_end(log: Log) -> Array:
-    """Returns what a part that comes free may be off by (rows, 12); elsewhere zero.
+def _lost_at_the_end(episode: Episode, sensing: SensorReading) -> Array:
+    """Returns what a part that comes free may be off by (n, 12); elsewhere zero.
 
     That ends an episode. In which of the last two steps contact is lost, a moment
     decides: the whole load, and how far the arm springs back, beyond its motion in the
     step before.
+
+    Args:
+        episode: of a log.
+        sensing: of the scenario: a lever turns the sensor.
     """
-    return np.concatenate([_lost(episode) for episode in log.episodes])
-
-
-def _lost(episode: Episode) -> Array:
-    """Returns the same of an episode (n, 12)."""
-    states = observations(episode)
+    states = at_sensor(observations(episode), sensing.mounting)
     lost = np.zeros((len(states) - 1, 12))
     force, torque = _lengths(states[-_RELEASE - 1 :, 6:])
     has_ended = bool(episode["terminated"][-1]) and len(lost) > _RELEASE

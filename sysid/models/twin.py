@@ -103,8 +103,7 @@ class TwinModel(SimulatedModel):
         self._displacement: Array | None = None  # (rows, 2, 3) of begin and end
         self._transitions_by_sensor: dict[str, Transitions] = {}
         self._executed: dict[str, tuple[Steps, LatePoses | None]] = {}
-        if self.measurements.model_error is not None:
-            self.measurements = self._with_contact_error(self.measurements)
+        self.measurements = self._with_contact_error(self.measurements)
 
     def _with_contact_error(self, measured: Measurements) -> Measurements:
         """Returns what was measured, with what hangs on how stiff contact is.
@@ -112,9 +111,9 @@ class TwinModel(SimulatedModel):
         That is known about; it matters where a bolt wedges, to which the grip yields
         less than contact does. Not of whole episodes, nor where it is a parameter.
         """
-        model = self.replace(parameters=()).surrogate()
+        model, error = self.replace(parameters=()).surrogate(), measured.model_error
         own = any(each.path.startswith("contact.impact") for each in self.parameters)
-        if own or model.rollout or model.costly:
+        if error is None or own or model.rollout or model.costly:
             return measured
         about = (1.0 - _STIFFNESS_ERROR, 1.0 + _STIFFNESS_ERROR)
         scenarios = [_with_stiffness(model.scenario, share) for share in about]
@@ -125,7 +124,7 @@ class TwinModel(SimulatedModel):
             )
         except FAILURES:
             return measured
-        error = np.hypot(measured.model_error, 0.5 * (stiff - soft))
+        error = np.hypot(error, 0.5 * (stiff - soft))
         return dataclasses.replace(measured, model_error=error)
 
     def _simulated(self, thetas: Array, rows: slice) -> list[Array | str]:

@@ -20,7 +20,6 @@ Exit status: 0 if one hypothesis is left, 3 if not, 2 for input that can't be us
 
 import argparse
 import contextlib
-import copy
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -50,6 +49,7 @@ from sysid.diagnosis.arm_subject import ArmSubject
 from sysid.diagnosis.loop import pursue
 from sysid.diagnosis.station_subject import StationSubject
 from sysid.diagnosis.subject import Subject
+from sysid.models.twin import with_impact_as_stiff
 from sysid.report import diagnosis_page
 from sysid.workers import Workers
 
@@ -89,8 +89,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add(
         "--contact",
         choices=("impact", "hydroelastic"),
-        help="of the twin that judges and predicts: impact takes a minute where "
-        "hydroelastic takes ten, and differs more from the cell (default: the "
+        help="of the twin that judges and predicts: impact, as stiff, takes a minute "
+        "where hydroelastic takes ten, and differs more from the cell (default: the "
         "scenario's)",
     )
     common.add_hidden_argument(add)
@@ -182,12 +182,21 @@ def _station_subject(
     progress: Progress,
 ) -> Subject:
     """Returns a station in contact, as what is diagnosed."""
-    model = dataclasses.replace(scenario, contact=copy.copy(scenario.contact))
-    model.contact.model = args.contact or scenario.contact.model
+    model = _with_contact(scenario, args.contact or scenario.contact.model)
     view = MeshcatView(start_meshcat(), record=True) if args.html else None
     log = GrowingLog(model, args.out / "log", station, real, progress, view)
     own = [kind for kind in kinds if issubclass(kind, Experiment)]
     return StationSubject(model, log, own or None, None, progress)
+
+
+def _with_contact(scenario: Scenario, model: str) -> Scenario:
+    """Returns a scenario with a model of contact; IMPACT is as stiff as the other."""
+    if model == scenario.contact.model:
+        return scenario
+    if model == "impact":
+        return with_impact_as_stiff(scenario)
+    contact = dataclasses.replace(scenario.contact, model=model)
+    return dataclasses.replace(scenario, contact=contact)
 
 
 def _arm_subject(
