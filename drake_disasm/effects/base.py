@@ -22,6 +22,7 @@ import abc
 import dataclasses
 import inspect
 import itertools
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
@@ -137,6 +138,21 @@ def name_in_words(name: str) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name).lower()
 
 
+@dataclasses.dataclass(frozen=True)
+class Reach:
+    """How far a log goes; infinite where that is not known.
+
+    Attributes:
+        duration: of its longest episode [s].
+        way: of the bolt along x of G, from end to end [m].
+        speed: greatest that the bolt is commanded [m/s].
+    """
+
+    duration: float = math.inf
+    way: float = math.inf
+    speed: float = math.inf
+
+
 @dataclasses.dataclass
 class Effect:
     """Base of all effects; see the module's docstring.
@@ -206,14 +222,14 @@ class Effect:
         return shape_parameters(cls)
 
     @classmethod
-    def greatest_shapes(cls, duration: float) -> dict[str, float]:
+    def greatest_shapes(cls, reach: Reach) -> dict[str, float]:
         """Returns the greatest values of shape parameters in a log, by name.
 
         Beyond them it is what another effect is: a step that takes as long as the log
         is a drift.
 
         Args:
-            duration: of the log's longest episode [s]; infinite if it is not known.
+            reach: of the log.
         """
         return {}
 

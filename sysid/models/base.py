@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import Effect
+from drake_disasm.effects import Effect, Reach
 from drake_disasm.scenario import Scenario
 from sysid.models.bookkeeping import Assumption, Bookkeeping, Frame, Poses
 from sysid.models.effects import (
@@ -144,6 +144,11 @@ class LogModel(abc.ABC):
         return np.inf
 
     @property
+    def reach(self) -> Reach:
+        """How far the log goes."""
+        return Reach(self.duration)
+
+    @property
     def travel(self) -> Mapping[str, float]:
         """How far each joint moves, from end to end [rad or m]; empty: not known."""
         return {}
@@ -199,7 +204,7 @@ class LogModel(abc.ABC):
             parameters: additional ones, fields of effects: their paths are
                 `effects.0.size` and the like.
         """
-        added = within_reach(parameters, effects, self.travel, self.duration)
+        added = within_reach(parameters, effects, self.travel, self.reach)
         return self.replace(
             _effects=tuple(effects), parameters=(*self.parameters, *added)
         )

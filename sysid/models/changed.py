@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import Effect
+from drake_disasm.effects import Effect, Reach
 from sysid.models.base import Array, LogModel
 from sysid.models.effects import field_of
 from sysid.models.validity import Validity
@@ -191,6 +191,11 @@ class ChangedModel(LogModel):
     def duration(self) -> float:
         """See LogModel."""
         return self.newer.duration
+
+    @property
+    def reach(self) -> Reach:
+        """See LogModel."""
+        return self.newer.reach
 
     @property
     def travel(self) -> dict[str, float]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drake_disasm.effects import ArmEffect, Effect
+from drake_disasm.effects import ArmEffect, Effect, Reach
 from sysid.parameters import Parameter
 
 _RESTS = 0.05  # of the greatest speed: noise of a filtered velocity is no motion
@@ -115,7 +115,7 @@ def within_reach(
     parameters: Sequence[Parameter],
     effects: Sequence[Effect],
     travel: Mapping[str, float],
-    duration: float,
+    reach: Reach,
 ) -> list[Parameter]:
     """Returns fields of effects, their shapes bounded by what a log can show.
 
@@ -123,13 +123,13 @@ def within_reach(
         parameters: whose paths are `effects.0.size` and the like.
         effects: of the model.
         travel: of each joint, by name [rad or m].
-        duration: of the longest episode [s]; infinite if it is not known.
+        reach: of the log.
     """
     found = []
     for parameter in parameters:
         effect, field = effects[int(parameter.path.split(".")[1])], field_of(parameter)
         least = _least_shapes(effect, travel).get(field, -math.inf)
-        most = effect.greatest_shapes(duration).get(field, math.inf)
+        most = effect.greatest_shapes(reach).get(field, math.inf)
         low = min(max(parameter.low, least), parameter.nominal)
         high = max(min(parameter.high, most), parameter.nominal)
         found.append(dataclasses.replace(parameter, low=low, high=high))

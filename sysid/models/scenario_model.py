@@ -33,7 +33,7 @@ class ScenarioModel(LogModel):
         self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
     ) -> Self:
         """See LogModel."""
-        added = within_reach(parameters, effects, self.travel, self.duration)
+        added = within_reach(parameters, effects, self.travel, self.reach)
         return self.replace(
             scenario=dataclasses.replace(self.scenario, effects=list(effects)),
             parameters=(*self.parameters, *added),

@@ -12,6 +12,7 @@ from drake_disasm.effects import (
     EnvironmentEffect,
     MotionEffect,
     PoseEffect,
+    Reach,
     SensorEffect,
     SensorResidualModel,
     motion_chain,
@@ -208,6 +209,13 @@ class TwinModel(SimulatedModel):
         """See LogModel."""
         steps = self._transitions.steps.index.max() + 1
         return float(steps * self._transitions.period)
+
+    @property
+    def reach(self) -> Reach:
+        """See LogModel."""
+        steps = self._transitions.steps
+        speed = np.linalg.norm(steps.qd_rate[:, :3], axis=1).max()
+        return Reach(self.duration, float(np.ptp(steps.q[:, 0])), float(speed))
 
     @property
     def costly(self) -> bool:

@@ -3,9 +3,16 @@
 import dataclasses
 
 from drake_disasm.common.arrays import as_number, at_least, exponential
-from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
+from drake_disasm.effects.base import (
+    BoltMotion,
+    Environment,
+    EnvironmentEffect,
+    Reach,
+)
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
+
+_WIDEST = 1.0 / 3.0  # of the way: from its middle to the ends it falls to a tenth
 
 
 @register_effect
@@ -36,6 +43,11 @@ class RustyPatch(EnvironmentEffect):
     is_local = True
     noun = "a patch of friction in the groove"
     experiment = "slow pulls over the whole groove, both ways, under one normal force"
+
+    @classmethod
+    def greatest_shapes(cls, reach: Reach) -> dict[str, float]:
+        """See Effect: what is wider is friction everywhere."""
+        return {"width": _WIDEST * reach.way}
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds the friction at this place."""

@@ -8,7 +8,12 @@ from drake_disasm.common.arrays import (
     exponential,
     namespace,
 )
-from drake_disasm.effects.base import BoltMotion, Environment, EnvironmentEffect
+from drake_disasm.effects.base import (
+    BoltMotion,
+    Environment,
+    EnvironmentEffect,
+    Reach,
+)
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
 
@@ -31,6 +36,11 @@ class GrooveStribeckFriction(EnvironmentEffect):
     is_local = True
     noun = "friction in the groove that falls with speed"
     experiment = "pulls under one normal force, from very slow to fast"
+
+    @classmethod
+    def greatest_shapes(cls, reach: Reach) -> dict[str, float]:
+        """See Effect: what hardly falls at any speed is friction at each."""
+        return {"velocity": reach.speed}
 
     def apply(self, environment: Environment, bolt: BoltMotion) -> Environment:
         """Adds what is left at this speed."""

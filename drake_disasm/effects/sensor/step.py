@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from drake_disasm.common.arrays import Array, limited
-from drake_disasm.effects.base import Sensing, SensorEffect
+from drake_disasm.effects.base import Reach, Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
 
@@ -48,9 +48,9 @@ class SensorStep(SensorEffect):
     }
 
     @classmethod
-    def greatest_shapes(cls, duration: float) -> dict[str, float]:
+    def greatest_shapes(cls, reach: Reach) -> dict[str, float]:
         """See Effect: what sets in more slowly is a drift, or a warm-up."""
-        return {"rise": _SLOWEST * duration / _PARTS}
+        return {"rise": _SLOWEST * reach.duration / _PARTS}
 
     @classmethod
     def grids(cls, duration: float) -> dict[str, tuple[float, ...]]:

@@ -3,7 +3,7 @@
 import dataclasses
 
 from drake_disasm.common.arrays import Array, namespace
-from drake_disasm.effects.base import Sensing, SensorEffect
+from drake_disasm.effects.base import Reach, Sensing, SensorEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
 from drake_disasm.effects.registry import register_effect
 
@@ -38,14 +38,14 @@ class SensorWarmUp(SensorEffect):
     experiment = "a rest from switching on until the reading stays, pose unchanged"
 
     @classmethod
-    def greatest_shapes(cls, duration: float) -> dict[str, float]:
+    def greatest_shapes(cls, reach: Reach) -> dict[str, float]:
         """See Effect: what settles more slowly is a drift."""
-        return {"time_constant": _SLOWEST * duration}
+        return {"time_constant": _SLOWEST * reach.duration}
 
     @classmethod
     def grids(cls, duration: float) -> dict[str, tuple[float, ...]]:
         """See Effect: those that are no drift."""
-        slowest = cls.greatest_shapes(duration)["time_constant"]
+        slowest = cls.greatest_shapes(Reach(duration))["time_constant"]
         usual = tuple(value for value in _GRID if value < slowest)
         ends = (slowest,) if slowest < _GRID[-1] else ()
         return {"time_constant": (*usual, *ends)}

@@ -13,6 +13,7 @@ from drake_disasm.effects import (
     Compliance,
     GrooveBend,
     GrooveClearance,
+    GrooveStribeckFriction,
     GrooveViscousFriction,
     MotionLag,
     PoseDelay,
@@ -23,6 +24,7 @@ from drake_disasm.effects import (
     SensorGainDrift,
     SensorMounting,
     SensorResidualModel,
+    SensorWarmUp,
 )
 from drake_disasm.logs import read_log
 from drake_disasm.policies import Exploring, make_policy
@@ -190,3 +192,21 @@ def test_a_learned_effect_knows_what_the_models_say_it_knows(tmp_path):
     np.testing.assert_allclose(more[:, channels.index("fy")], expected, atol=1e-9)
     rest = np.delete(more, channels.index("fy"), axis=1)
     np.testing.assert_allclose(rest, 0.0, atol=1e-9)
+
+
+def test_shapes_that_would_be_another_effect_are_out_of_a_logs_reach(tmp_path):
+    """A patch along the whole way, or a fall that no speed shows, is friction."""
+    scenario = nominal()
+    transitions_log(tmp_path / "log", scenario, [], 0, episodes=2, steps=_STEPS)
+    model = TwinModel([read_log(tmp_path / "log")], scenario, ())
+    assert model.reach.duration == pytest.approx(_STEPS * scenario.task.period)
+    assert 0.01 < model.reach.way < 0.1 and 0.0 < model.reach.speed < 0.1
+    for effect, field, most in (
+        (RustyPatch(), "width", max(0.008, model.reach.way / 3.0)),
+        (GrooveStribeckFriction(), "velocity", max(0.01, model.reach.speed)),
+        (SensorWarmUp(), "time_constant", 30.0),
+    ):
+        path = f"effects.0.{field}"
+        shape = Parameter(path, getattr(effect, field), 1e-4, 100.0, path=path)
+        found = model.with_effects([effect], [shape])
+        assert found.parameters[0].high == pytest.approx(most)
