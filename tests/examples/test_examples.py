@@ -18,7 +18,7 @@ PRINTED = {
     "outside_force": [r"bolt +-(4\.9|5\.0)", r"-52\.[56]"],
     "own_policy": ["twin        12", "cell        12"],
     "own_environment": [r"last  eight episodes: mean reward  -0\."],
-    "own_agent": ["4      120", "8      239"],
+    "own_agent": ["4      120", "8      238"],
     "own_experiment": [r"Staircase\(top=6.0, stairs=3\)", r"11\.\d\d +-[56]\.\d\d"],
     "own_effect": [
         "MagneticCatch  confirmed  force = ",

@@ -71,14 +71,16 @@ def test_an_arm_moves_within_the_limits_that_hold_hardware(tmp_path) -> None:
 
 
 def test_a_hold_keeps_the_rows_and_the_next_start_goes_on(tmp_path) -> None:
-    weak = {"max_force": 1.0}
-    with (
-        fake_hardware("removal", limits=weak) as fake,
-        refused("is held", "force"),
-    ):
+    hidden = [SensorWarmUp(fz=30.0, time_constant=2.0)]  # the robot runs away from it
+    with fake_hardware("removal", hidden=hidden) as fake, refused("is held"):
         _diagnose(fake, tmp_path)
     held = read_log(tmp_path / "log").episodes
     assert len(held) < 3 and len(held[-1].columns["time"]) > 3
+    with (
+        fake_hardware("removal", limits={"max_force": 1.0}) as fake,
+        refused("is not performed", "of what is allowed"),
+    ):
+        _diagnose(fake, tmp_path)
     with fake_hardware("removal") as fake, refused("stopped by hand"):
         _diagnose(fake, tmp_path, most=1)
     episodes = read_log(tmp_path / "log").episodes

@@ -35,7 +35,7 @@ def test_an_effect_is_worth_what_the_loss_rises_by_without_it(gain):
     fitter, effect = gain
     before, fit = fitter.fit(()), fitter.fit((effect,))
     assert fit.effect_gains["CommandGain"] == pytest.approx(
-        1 - fit.loss / before.loss, abs=0.03
+        1 - fit.loss / before.loss, abs=0.04
     )
     (x,) = fit.columns_of(effect.only(["x"]))
     assert fit.theta[x] == pytest.approx(0.03, rel=0.02)
