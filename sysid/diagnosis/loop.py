@@ -221,12 +221,18 @@ def refuted_names(
 ) -> tuple[str, ...]:
     """Returns the different verdicts of which no name is left.
 
+    Those that share a name are one.
+
     Args:
         asked: names of the verdict before each experiment.
         names: of the verdict after the last.
     """
-    given_up = [each for each in asked if each and not set(each) & set(names)]
-    return tuple(dict.fromkeys(short_names(sorted(each)) for each in given_up))
+    found, known = [], set(names)
+    for each in asked:
+        if each and not known & set(each):
+            found.append(short_names(sorted(each)))
+            known |= set(each)
+    return tuple(found)
 
 
 def _no_name_stands(refuted: Sequence[str]) -> str:

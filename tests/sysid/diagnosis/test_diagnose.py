@@ -55,6 +55,7 @@ def test_verdicts_are_refuted_of_which_no_name_is_left() -> None:
     assert refuted_names([()], one) == ()
     assert refuted_names([one, two, one], ("B",)) == ("A",)
     assert refuted_names([one, two, ("C", "B")], ("D",)) == ("A", "B and C")
+    assert refuted_names([("A", "B"), ("A", "C"), one], ("D",)) == ("A and B",)
 
 
 def test_the_report_tells_the_story(warm) -> None:
