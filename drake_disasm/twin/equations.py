@@ -967,11 +967,12 @@ def _lean_on_edge(
         stiffness: see `_edge_stiffness`.
         w: workspace, with the depth.
     """
-    e = w[LAW + 1]
+    e, head = w[LAW + 1], w[GAPS + 10]
     w[STIFFNESS + k], w[EXPONENT + k] = stiffness, e + 1.5
     if w[DEPTH + k] > 0.0:
-        inwards = 1.5 / (e + 2.5) * w[DEPTH + k] / tilt
-        share = max(0.0, 1.0 - inwards / w[GAPS + 10])
+        inwards = min(1.5 / (e + 2.5) * w[DEPTH + k] / tilt, head)
+        share = 1.0 - inwards / head
+        w[STIFFNESS + k] *= math.sqrt(0.5 * (1.0 + share))  # of a chord, (2 R - s) s
         _off_axis(k, share * along, height, share * across, w)
 
 
