@@ -90,7 +90,7 @@ class GripObserver:
         believed = shrunk(missed, self.noise)
         elastic = self.grip.carried(give)
         elastic += self.grip.after_growth(self._on_bolt(read, believed))
-        wrench = whole.wrench[ends] - self._on_bolt(read, missed - believed)
+        wrench = self._on_bolt(read, led.states[is_known, 6:] + believed)
         return whole.beginning(ends, elastic, self.grip.rates(elastic, wrench))
 
     def change(self, one: Transitions, other: Transitions) -> Array:

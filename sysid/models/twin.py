@@ -111,7 +111,8 @@ class TwinModel(SimulatedModel):
         """Returns what was measured, with what hangs on how stiff contact is.
 
         That is known about; it matters where a bolt wedges, to which the grip yields
-        less than contact does. Not of whole episodes, nor where it is a parameter.
+        less than contact does. Whether it does, the poses tell: a sensor may lie. Not
+        of whole episodes, nor where it is a parameter.
         """
         model, error = self.replace(parameters=()).surrogate(), measured.model_error
         own = any(each.path.startswith("contact.impact") for each in self.parameters)
@@ -120,6 +121,7 @@ class TwinModel(SimulatedModel):
         about = (1.0 - _STIFFNESS_ERROR, 1.0 + _STIFFNESS_ERROR)
         scenarios = [_with_stiffness(model.scenario, share) for share in about]
         try:
+            model = model._led_without_sensor()
             soft, stiff = (
                 model.replace(scenario=scenario).predictions(np.zeros(0))
                 for scenario in scenarios
@@ -344,6 +346,19 @@ class TwinModel(SimulatedModel):
         is_new = not self._whole.seen.any()
         noticeable = is_new or np.mean(change**2, axis=0).max() > 1.0
         return known if noticeable or whole is not self._whole else self._whole
+
+    def _led_without_sensor(self) -> Self:
+        """Returns a model without parameters whose steps begin where the last one led.
+
+        With the grip as the model has it, whatever the sensor reads.
+        """
+        known, theta, observer = self._whole, np.zeros(0), self._observer
+        ends, read = np.flatnonzero(known.steps.index > 0), known.read(self.reading)
+        for _ in range(_PASSES):
+            led = self.replace(_whole=known)._ends(theta, ends - 1)
+            read[ends, 6:] = led.states[:, 6:]
+            known = observer.corrected(known, ends, led, read)
+        return self.replace(_whole=known, _transitions=known)
 
     def _ends(self, theta: Array, rows: NDArray[np.int64]) -> Led:
         """Returns where some steps of the log lead, by their numbers (n,)."""
