@@ -99,18 +99,21 @@ class ArmSubject(Subject):
         """See Subject."""
         return [JointExcitation().plan(self._log.space)]
 
-    def hazard(self, plan: JointPlan) -> str:
+    def foreseen(self, plans: Sequence[JointPlan]) -> list[tuple[float, str]]:
         """See Subject."""
-        return hazard_without_effects(plan, self._log.header, self._log.space)
+        header, space = self._log.header, self._log.space
+        return [
+            (
+                float(plan.motion.time[-1]) + _WAY,
+                hazard_without_effects(plan, header, space),
+            )
+            for plan in plans
+        ]
 
     def plans(self) -> list[JointPlan]:
         """See Subject."""
         space = self._log.space
         return [e.plan(space) for kind in self._kinds for e in kind.variants()]
-
-    def most(self, plan: JointPlan) -> float:
-        """See Subject."""
-        return float(plan.motion.time[-1]) + _WAY
 
     def rivals(
         self,

@@ -1,6 +1,7 @@
 """A station in contact, and the log of the experiments on it."""
 
 from pathlib import Path
+from typing import Any
 
 from drake_disasm.common.progress import Progress, ignore_progress
 from drake_disasm.experiments import Plan
@@ -8,7 +9,7 @@ from drake_disasm.experiments.performing import Laboratory, Performance
 from drake_disasm.logs import read_log
 from drake_disasm.logs.columns import flat_columns
 from drake_disasm.safety import SafetyConfig
-from drake_disasm.scenario import Scenario
+from drake_disasm.scenario import Scenario, scenario_to_mapping
 from drake_disasm.task.recording import EpisodeRecorder, transitions_header
 from drake_disasm.task.simulation import StationFactory
 from drake_disasm.visualization import MeshcatView
@@ -44,10 +45,17 @@ class GrowingLog(ExperimentLog):
         self.seed = seed
         self._scenario, self._folder = scenario, folder
         self._view, views = view, [view] if view else []
+        self._real = scenario_to_mapping(real or scenario)
         self._laboratory = Laboratory(real or scenario, station, views)
         kind = self._laboratory.station.kind
         header = transitions_header(scenario, kind, {"program": "diagnose"})
         super().__init__(folder, header, progress)
+
+    @property
+    def reality(self) -> dict[str, Any]:
+        """What experiments are performed on: plain data, of a simulation all of it."""
+        kind = self._laboratory.station.kind
+        return {"station": kind} | ({} if kind == "hardware" else self._real)
 
     @property
     def limits(self) -> SafetyConfig | None:

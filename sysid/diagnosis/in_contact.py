@@ -144,11 +144,12 @@ def _hazard(
     for each, rival in zip(done, rivals, strict=True):
         force, torque = each.greatest
         if each.ended:
-            return f"under {rival.name} it ends by {each.ended}"
+            return f"under {rival.name} it ends by {each.ended}; see task.reward"
         if force > most_force or torque > most_torque:
             return (
                 f"under {rival.name} it presses by {force:.1f} N and {torque:.2f} N m, "
-                f"above {100 * _MARGIN:.0f} % of what is allowed"
+                f"above {100 * _MARGIN:.0f} % of what is allowed; see f_max and t_max "
+                "of task.reward, on hardware safety, too"
             )
         if limits and not is_within(limits, each.observations[:, :3]):
             return (

@@ -18,7 +18,7 @@ from drake_disasm.free_motion.table import MotionTable
 from drake_disasm.logs import Episode, Log, LogHeader
 from drake_disasm.logs.columns import flat_columns
 from sysid.diagnosis.design import Forecast
-from sysid.diagnosis.rivals import NOTHING, Rival, varied_parameters
+from sysid.diagnosis.rivals import AS_IT_IS, Rival, varied_parameters
 from sysid.fitting.candidates import Candidate, extended
 from sysid.fitting.fit import Fit
 from sysid.models.base import Array, LogModel
@@ -140,7 +140,7 @@ def hazard_without_effects(plan: JointPlan, header: LogHeader, space: ArmSpace) 
         space: limits of the arm.
     """
     torques = _torques_of_urdf(header, plan.motion)
-    return _hazard(plan, torques[None], [NOTHING], space)
+    return _hazard(plan, torques[None], [AS_IT_IS], space)
 
 
 def _hazard(

@@ -151,7 +151,7 @@ def pursue(
             need, left = Need.of(closed), budget.robot - session.robot_time
             predictions = session.predict(plans, rivals, need)
             best, reason = _choice(closed, rivals, predictions, need, left, asked)
-        if best is not None and not confirm(_question(best)):
+        if best is not None and not confirm(f"{closed.sentence} {_question(best)}"):
             best, reason = None, "stopped by hand; the same command goes on from here"
         if best is None:
             session.close(closed, rivals, reason)
@@ -267,9 +267,12 @@ def _question(best: Prediction) -> str:
     """Returns what a person is asked before an experiment."""
     force, torque = best.forecast.greatest
     most = f"{force:.1f} N" if force else f"{torque:.1f} N m at any joint"
-    return (
-        f"{best.plan.text}: {best.duration:.0f} s, at most {most} under any hypothesis"
-    )
+    return f"{_about(best.plan, best.duration)}, at most {most} under any hypothesis"
+
+
+def _about(plan: Any, duration: float) -> str:
+    """Returns an experiment, and how long it takes."""
+    return f"{plan.text}: about {duration:.0f} s"
 
 
 class _Session:
@@ -296,22 +299,34 @@ class _Session:
     def record_first(self, budget: Budget, confirm: Confirm) -> None:
         """Records what the first verdict needs, as far as the log lacks it."""
         subject = self._subject
-        for plan in subject.first()[subject.log.episodes :]:
-            if self.first_time > budget.robot:
-                raise DisasmError(
-                    f"budget: {budget.robot:g} s are spent before the first verdict; "
-                    "give more"
-                )
-            if hazard := subject.hazard(plan):
-                raise DisasmError(
-                    f"{plan.text}, before the first verdict, is not performed: "
-                    f"{hazard}; change what the scenario says of it"
-                )
-            if not confirm(f"{plan.text}: at most {subject.most(plan):.0f} s"):
+        plans = subject.first()[subject.log.episodes :]
+        foreseen = subject.foreseen(plans)
+        self._refuse(plans, foreseen, budget)
+        for plan, (duration, _) in zip(plans, foreseen, strict=True):
+            if not confirm(f"before the first verdict: {_about(plan, duration)}"):
                 raise DisasmError("stopped by hand before the first verdict")
             self.first_time += subject.log.perform(plan).duration
             self._write("")
             subject.log.refuse_hold()
+
+    def _refuse(
+        self,
+        plans: Sequence[Any],
+        foreseen: Sequence[tuple[float, str]],
+        budget: Budget,
+    ) -> None:
+        """Refuses first experiments that are not safe, or take too long."""
+        for plan, (_, hazard) in zip(plans, foreseen, strict=True):
+            if hazard:
+                raise DisasmError(
+                    f"{plan.text}, before the first verdict, is not performed: {hazard}"
+                )
+        needed = self.first_time + sum(duration for duration, _ in foreseen)
+        if plans and needed > budget.robot:
+            raise DisasmError(
+                f"budget: {budget.robot:g} s of robot time; recordings before the "
+                f"first verdict take about {needed:.0f} s, give more"
+            )
 
     def predict(
         self, plans: Sequence[Any], rivals: Sequence[Rival], need: Need

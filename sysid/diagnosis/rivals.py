@@ -27,6 +27,9 @@ from sysid.workers import Workers
 #: What the hypothesis is called that the model lacks nothing (more).
 NOTHING = "nothing"
 
+#: And where that is said of what would happen.
+AS_IT_IS = "the model as it is"
+
 #: How many experiments are made about something that is unexplained, or suggested.
 TRIED = 3
 

@@ -12,7 +12,7 @@ from sysid.diagnosis.design import Prediction, predict
 from sysid.diagnosis.growing_log import GrowingLog
 from sysid.diagnosis.in_contact import twin_forecasts
 from sysid.diagnosis.rivals import (
-    NOTHING,
+    AS_IT_IS,
     Need,
     Rival,
     TwinRival,
@@ -38,7 +38,9 @@ class StationSubject(Subject):
         effects: Sequence[type[Effect]] | None,
         progress: Progress,
     ) -> None:
-        super().__init__(log, effects, {"scenario": scenario_to_mapping(scenario)})
+        stated = scenario_to_mapping(scenario)
+        settings = {"scenario": stated, "reality": log.reality}
+        super().__init__(log, effects, settings)
         self._scenario, self._log = scenario, log
         kinds = registered_experiments() if experiments is None else experiments
         self._kinds, self._progress = kinds, progress
@@ -48,22 +50,20 @@ class StationSubject(Subject):
         seeds = [self._log.seed + number for number in range(FIRST)]
         return [Removal(seed=seed).plan(self._scenario) for seed in seeds]
 
-    def hazard(self, plan: Plan) -> str:
+    def foreseen(self, plans: Sequence[Plan]) -> list[tuple[float, str]]:
         """See Subject."""
-        alone = [TwinRival(NOTHING, 1.0, 0.0, self._scenario)]
+        if not plans:
+            return []
+        alone = [TwinRival(AS_IT_IS, 1.0, 0.0, self._scenario)]
         limits = self._log.limits
-        (found,) = twin_forecasts([plan], alone, limits, self._progress)
-        return found.hazard
+        found = twin_forecasts(plans, alone, limits, self._progress)
+        return [(each.duration, each.hazard) for each in found]
 
     def plans(self) -> list[Plan]:
         """See Subject: all that the scenario has anything to do with."""
         kinds = [kind for kind in self._kinds if kind is not Removal]
         plans = [e.plan(self._scenario) for kind in kinds for e in kind.variants()]
         return [plan for plan in plans if plan.phases]
-
-    def most(self, plan: Plan) -> float:
-        """See Subject."""
-        return plan.most_steps * plan.period
 
     def rivals(
         self,

@@ -45,16 +45,15 @@ class Subject(abc.ABC):
         """Returns what is performed before the first verdict."""
 
     @abc.abstractmethod
-    def hazard(self, plan: Any) -> str:
-        """Returns why that is not safe under the model as it is; empty if it is."""
+    def foreseen(self, plans: Sequence[Any]) -> list[tuple[float, str]]:
+        """Returns how long each takes [s], and why it is not safe; empty if it is.
+
+        Under the model as it is.
+        """
 
     @abc.abstractmethod
     def plans(self) -> Sequence[Any]:
         """Returns the experiments to choose from."""
-
-    @abc.abstractmethod
-    def most(self, plan: Any) -> float:
-        """Returns how long an experiment may take [s]."""
 
     @abc.abstractmethod
     def rivals(

@@ -1,15 +1,18 @@
 """The story of a diagnosis: what was left, what was done about it, what came out."""
 
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
 import plotly.graph_objects as go
+from plotly.colors import qualitative
 
 from sysid.diagnosis import Diagnosis, Round
 from sysid.report.plots import MEASURED, Plot, finish
 from sysid.report.templates import render
 
 _HEIGHT = 280  # pixels
+_COLOURS = qualitative.D3
 
 
 def diagnosis_page(
@@ -22,7 +25,12 @@ def diagnosis_page(
         origin: provenance.
         is_watched: whether there is a page of each experiment in `meshcat`.
     """
-    plots = [experiment_plot(r) if r.experiment else None for r in found.rounds]
+    names = dict.fromkeys(name for one in found.rounds for name in one.predicted)
+    colours = dict(zip(names, itertools.cycle(_COLOURS), strict=False))
+    plots = [
+        experiment_plot(one, colours) if one.experiment else None
+        for one in found.rounds
+    ]
     rounds = list(zip(found.rounds, plots, strict=True))
     return render(
         "story.html.j2",
@@ -33,11 +41,19 @@ def diagnosis_page(
     )
 
 
-def experiment_plot(one: Round) -> Plot:
-    """Returns what each rival predicted of an experiment, and what was measured."""
+def experiment_plot(one: Round, colours: Mapping[str, str]) -> Plot:
+    """Returns what each rival predicted of an experiment, and what was measured.
+
+    Args:
+        one: round with an experiment.
+        colours: of rivals, by name.
+    """
     figure, (predicted, measured) = go.Figure(), one.periods
     for name, values in one.predicted.items():
-        figure.add_trace(go.Scatter(y=values, dx=predicted, mode="lines", name=name))
+        line = {"color": colours[name]}
+        figure.add_trace(
+            go.Scatter(y=values, dx=predicted, mode="lines", line=line, name=name)
+        )
     figure.add_trace(
         go.Scatter(
             y=one.measured,

@@ -15,7 +15,7 @@ _ARM = ("--kind", "joint_motion")
     [
         (["--experiments", "Reversal"], "did you mean 'Reversals'"),
         (["--experiments", "none.py"], "no such file"),
-        ([*_TWIN, "--robot-time", "1", "--yes"], "spent before the first verdict"),
+        ([*_TWIN, "--robot-time", "1", "--yes"], "before the first verdict take about"),
         (["--station", "hardware", "--yes"], "--hardware-config"),
         (["--hidden", "nowhere", "--yes"], "nowhere"),
         (_TWIN, "give --yes"),

@@ -23,12 +23,13 @@ import contextlib
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 from drake_disasm.common import options, program
 from drake_disasm.common.errors import DisasmError
 from drake_disasm.common.files import make_folder, write_text
-from drake_disasm.common.progress import Progress
+from drake_disasm.common.progress import Progress, ProgressUpdate
 from drake_disasm.common.user_code import import_named
 from drake_disasm.experiments import (
     AnyExperiment,
@@ -143,7 +144,6 @@ def main(arguments: Sequence[str]) -> int:
     kinds = [kind for name in args.experiments or () for kind in _experiments(name)]
     _refuse_others(kinds, args.kind)
     budget = Budget(args.robot_time, _MINUTE * args.verdict_time)
-    confirm = (lambda _: True) if args.yes else _asked
     with (
         program.ProgressBar(unit="simulation") as progress,
         Workers(args.workers, progress=progress) as workers,
@@ -151,6 +151,10 @@ def main(arguments: Sequence[str]) -> int:
     ):
         make = _station_subject if args.kind == _IN_CONTACT else _arm_subject
         subject = make(args, scenario, station, real, kinds, progress)
+        if subject.log.episodes:
+            print(f"{args.out}: goes on after {subject.log.episodes} recordings")
+
+        confirm = partial(_announced, progress) if args.yes else _asked
         found = pursue(subject, args.out, budget, confirm, workers)
     origin = program.provenance("drake-disasm diagnose", arguments, 0)
     write_text(args.out / "report.html", diagnosis_page(found, origin, args.html))
@@ -252,6 +256,12 @@ def _station(
         return
     with hardware.open_station(scenario, args.hardware_config, False) as station:
         yield lambda _: station
+
+
+def _announced(progress: Progress, question: str) -> bool:
+    """Says what is performed next, and why."""
+    progress(ProgressUpdate("diagnosing", message=question))
+    return True
 
 
 def _asked(question: str) -> bool:

@@ -99,12 +99,13 @@ def test_a_person_may_say_no_and_a_budget_may_be_too_small(tmp_path: Path) -> No
     with refused("stopped by hand"):
         diagnose(IMPACT, tmp_path / "no", station="twin", confirm=no, **FEW)
     assert "Removal" in asked[0]
-    with refused("budget", "before the first verdict"):
+    with refused("budget", "before the first verdict", "about"):
         diagnose(IMPACT, tmp_path / "few", station="twin", budget=Budget(1.0))
+    assert not list((tmp_path / "few" / "log").glob("*.parquet"))
 
 
 def test_the_first_recording_is_run_on_the_twin_before(tmp_path: Path) -> None:
     weak = load_scenario("removal", ["contact.model=impact", "task.reward.f_max=1"])
-    with refused("Removal", "is not performed", "under nothing it"):
+    with refused("Removal", "is not performed", "under the model as it is"):
         diagnose(weak, tmp_path, station="twin", **FEW)
     assert not list((tmp_path / "log").glob("*.parquet"))
