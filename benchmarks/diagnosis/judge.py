@@ -91,7 +91,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         nargs="+",
         type=options.positive,
         metavar="N",
-        help="the first N, or those from N up to M (default: all of the group)",
+        help="the first N, those from N up to M, or these three and more "
+        "(default: all of the group)",
     )
     add(
         "--seconds",
@@ -130,7 +131,7 @@ def main(arguments: Sequence[str]) -> int:
     args = parse(arguments)
     for name in args.runner:
         _runner(name)  # an unknown one is refused before hours of work
-    numbers = range(GROUPS[args.group][1])[slice(*(args.worlds or [None]))]
+    numbers = _numbers(args.group, args.worlds or [])
     kept = FinishedWork(args.out / "answers")
     found: dict[str, list[Answer]] = {}
     with ProgressBar(unit="world") as progress:
@@ -148,6 +149,14 @@ def main(arguments: Sequence[str]) -> int:
     title = "What is hidden in a cell, found by experiments"
     write_result(args.results, title, _COLUMNS, rows, _PROGRAM, arguments)
     return 0
+
+
+def _numbers(group: str, worlds: Sequence[int]) -> Sequence[int]:
+    """Returns the numbers of the worlds that are asked for."""
+    every = range(GROUPS[group][1])
+    if len(worlds) > 2:
+        return [number for number in worlds if number in every]
+    return every[slice(*(worlds or [None]))]
 
 
 def _job(
