@@ -156,7 +156,7 @@ def _numbers(group: str, worlds: Sequence[int]) -> Sequence[int]:
     every = range(GROUPS[group][1])
     if len(worlds) > 2:
         return [number for number in worlds if number in every]
-    return every[slice(*(worlds or [None]))]
+    return every[slice(*worlds)] if worlds else every
 
 
 def _job(

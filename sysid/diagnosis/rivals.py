@@ -30,7 +30,7 @@ NOTHING = "nothing"
 #: And where that is said of what would happen.
 AS_IT_IS = "the model as it is"
 
-#: How many experiments are made about something that is unexplained, or suggested.
+#: How many experiments are made about what is unexplained, suggested, or unseen.
 TRIED = 3
 
 #: How far apart two rivals are that differ by more than chance, in standard deviations.
@@ -304,33 +304,44 @@ def _fitter(
 
 
 def unseen_rivals(
-    closed: ClosedLoop, log: GrowingLog, workers: Workers, folder: Path | None
+    closed: ClosedLoop,
+    log: GrowingLog,
+    workers: Workers,
+    folder: Path | None,
+    asked: Sequence[tuple[str, ...]],
 ) -> tuple[TwinRival, ...]:
     """Returns the verdict, and what its log does not speak against, each as a rival.
 
-    An effect that its fit leaves at no size is one of a size that matters, unless the
-    log speaks against that. Where something is named, that is all that was asked.
+    An effect that its fit leaves at no size is one of a size that matters, in the field
+    in which more of the log would show it soonest, unless the log speaks against that.
+    Where something is named, that is all that was asked; nothing is asked three times.
+
+    Args:
+        closed: the verdict.
+        log: so far.
+        workers: fit.
+        folder: of a cache of fits.
+        asked: names of the verdict before each experiment.
     """
     scenario = closed.scenario
     if scenario is None:
         return ()
-    if closed.verdict.confirmed:
-        name = " and ".join(closed.verdict.confirmed)
+    named = closed.verdict.confirmed
+    if named or list(asked).count(()) >= TRIED:
+        name = " and ".join(named) or NOTHING
         return (TwinRival(name, 1.0, 0.0, scenario),)
     model = log.model(scenario)
     fitter, library = _fitter(closed, model, workers, folder), candidates(model)
     alone, without = fitter.fit(()).loss, _loss(model)
     found = [TwinRival(NOTHING, 1.0, alone, scenario)]
-    for kind in sorted(closed.verdict.undetectable)[:_MOST]:
-        effect = _of_size(kind, closed.verdict.limits)
-        if effect is None:
-            continue
+    for kind, limit in _unseen(closed.verdict.limits)[:_MOST]:
+        effect = _of_size(kind, limit)
         more = dataclasses.replace(scenario, effects=[*scenario.effects, effect])
-        loss = alone + _loss(log.model(more)) - without
-        rival = TwinRival(kind, 1.0, loss, more)
-        fit = fitter.fit(tuple(each for each in library if each.name == kind)[:1])
+        loss, name = alone + _loss(log.model(more)) - without, limit.effect
+        rival = TwinRival(name, 1.0, loss, more)
+        fit = fitter.fit(tuple(each for each in library if each.name == name)[:1])
         if alone - fit.loss >= BY_CHANCE**2:
-            rival = twin_rival(kind, fit, 1.0, fit.loss) or rival
+            rival = twin_rival(name, fit, 1.0, fit.loss) or rival
         if rival.loss - alone < BY_CHANCE**2:
             found.append(rival)
     return tuple(dataclasses.replace(each, weight=1.0 / len(found)) for each in found)
@@ -342,24 +353,32 @@ def _loss(model: LogModel) -> float:
     return float(np.sum(pseudo_residual(error, model.default_huber_delta) ** 2))
 
 
-def _of_size(kind: str, limits: Sequence[DetectionLimit]) -> Effect | None:
+def _unseen(
+    limits: Sequence[DetectionLimit],
+) -> list[tuple[type[Effect], DetectionLimit]]:
+    """Returns effects that a log would not show at half of a field's bound.
+
+    Each in the field, and the shape, in which it would soonest; and the soonest first.
+    """
+    found: dict[str, tuple[type[Effect], DetectionLimit]] = {}
+    for limit in sorted(limits, key=lambda each: each.share):
+        made = effect_class(limit.effect)
+        if made is None or limit.share < _OF_BOUND or limit.effect in found:
+            continue
+        if limit.field in {field.name for field in dataclasses.fields(made)}:
+            found[limit.effect] = made, limit
+    return list(found.values())
+
+
+def _of_size(kind: type[Effect], limit: DetectionLimit) -> Effect:
     """Returns an effect that a log could not have shown, of a size that matters.
 
-    In the field and shape that it would have shown soonest: half of its bound, or twice
-    of what would have been found.
+    In the field and shape of its limit: half of its bound, or twice of what would have
+    been found.
     """
-    made = effect_class(kind)
-    if made is None:
-        return None
-    fields = {field.name for field in dataclasses.fields(made)}
-    own = [x for x in limits if x.effect == kind and x.field in fields]
-    if not own:
-        return None
-    best = min(own, key=lambda limit: limit.share)
-    field = next(f for f in dataclasses.fields(made) if f.name == best.field)
-    high = field.metadata["high"]
-    size = _OF_BOUND * high
-    if best.amplitude is not None:
-        size = math.copysign(min(_TIMES * abs(best.amplitude), size), size)
-    pairs = (part.split("=") for part in best.shape.split(", ") if part)
-    return made(**{best.field: size}, **{name: float(v) for name, v in pairs})
+    field = next(f for f in dataclasses.fields(kind) if f.name == limit.field)
+    size = _OF_BOUND * field.metadata["high"]
+    if limit.amplitude is not None:
+        size = math.copysign(min(_TIMES * abs(limit.amplitude), size), size)
+    pairs = (part.split("=") for part in limit.shape.split(", ") if part)
+    return kind(**{limit.field: size}, **{name: float(v) for name, v in pairs})

@@ -75,7 +75,7 @@ class StationSubject(Subject):
         """See Subject."""
         model = self._log.model()
         left = open_rivals(closed, model, twin_rival, workers, fits, asked)
-        return left or unseen_rivals(closed, self._log, workers, fits)
+        return left or unseen_rivals(closed, self._log, workers, fits, asked)
 
     def predict(
         self,

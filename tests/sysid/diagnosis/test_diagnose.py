@@ -12,6 +12,7 @@ from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
 from sysid.diagnosis import NOTHING, Budget, diagnose
 from sysid.diagnosis.loop import refuted_names
+from sysid.diagnosis.rivals import TRIED
 from sysid.report import diagnosis_page
 from tests.refusals import refused
 
@@ -71,6 +72,8 @@ def test_a_second_call_performs_nothing_more(warm) -> None:
     folder, real, first = warm
     again = diagnose(IMPACT, folder, station="twin", real=real, **FEW)
     assert again.robot_time == first.robot_time and again.reason == first.reason
+    with refused("another reality"):
+        diagnose(IMPACT, folder, station="twin", real=_real(), **FEW)
     with refused("resume with the same header"):
         diagnose(load_scenario("iiwa_peg"), folder, station="twin")
 
@@ -87,6 +90,8 @@ def test_nothing_is_found_where_nothing_is_hidden(tmp_path: Path) -> None:
     assert {name.partition(" and ")[0] for r in found.rounds for name in r.rivals} >= {
         NOTHING
     }
+    performed = [each for each in found.rounds if each.experiment]
+    assert len(performed) <= TRIED and all(len(r.rivals) > 1 for r in performed)
 
 
 def test_a_person_may_say_no_and_a_budget_may_be_too_small(tmp_path: Path) -> None:
