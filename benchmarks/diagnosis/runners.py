@@ -13,12 +13,10 @@ from diagnosis.worlds import World, library
 from drake_disasm.experiments import Plan, Removal, registered_experiments
 from drake_disasm.experiments.performing import Performance
 from sysid.diagnosis import (
-    NOTHING,
     Budget,
     GrowingLog,
-    TwinRival,
     diagnose,
-    twin_forecasts,
+    forecasts_as_it_is,
 )
 from sysid.diagnosis.station_subject import FIRST
 
@@ -66,8 +64,7 @@ def _drawn(world: World) -> Iterator[Plan]:
     kinds = [kind for kind in registered_experiments() if kind is not Removal]
     plans = [each.plan(world.model) for kind in kinds for each in kind.variants()]
     plans = [plan for plan in plans if plan.phases]
-    alone = [TwinRival(NOTHING, 1.0, 0.0, world.model)]
-    known = twin_forecasts(plans, alone)
+    known = forecasts_as_it_is(plans, world.model)
     safe = sorted(each.plan.text for each in known if not each.hazard)
     by_text = {plan.text: plan for plan in plans}
     random = np.random.default_rng([world.number, len(safe)])

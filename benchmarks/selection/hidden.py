@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.effects import registered_effects
+from drake_disasm.effects import Reach, registered_effects
 from sysid.fitting.candidates import Candidate, candidates, extended
 from sysid.models.base import LogModel
 from sysid.parameters import Parameter
@@ -125,10 +125,10 @@ def _of_size(
     shares = random.uniform(0.5, 1.0, len(own))
     signs = np.where(random.random(len(own)) < 0.5, -1.0, 1.0)
     signs = np.where([p.low < p.nominal for p in own], signs, 1.0)
-    scale, length = _FIRST, truth.model.duration
+    scale, reach = _FIRST, truth.model.reach
     for _ in range(_ROUNDS):
         values = [
-            _value(p, candidate, share, sign * scale, chosen, length)
+            _value(p, candidate, share, sign * scale, chosen, reach)
             for p, share, sign in zip(own, shares, signs, strict=True)
         ]
         theta = np.concatenate([truth.theta, values])
@@ -152,12 +152,12 @@ def _value(
     share: float,
     scale: float,
     chosen: Sequence[str],
-    duration: float,
+    reach: Reach,
 ) -> float:
     """Returns a parameter's value: an amplitude at a scale, or a shape in its grid."""
     field = parameter.name.rpartition(".")[2]
     if parameter.is_shape:
-        grid = type(candidate.effect).grids(duration)[field]
+        grid = type(candidate.effect).grids(reach)[field]
         return _between(parameter, min(grid), max(grid), 2.0 * share - 1.0)
     if field not in chosen:
         return parameter.nominal

@@ -213,11 +213,11 @@ class Effect:
         return [{"joint": joint} for joint in joints] if acts_at_joint(cls) else [{}]
 
     @classmethod
-    def grids(cls, duration: float) -> dict[str, tuple[float, ...]]:
+    def grids(cls, reach: Reach) -> dict[str, tuple[float, ...]]:
         """Returns values of each shape parameter from which a search starts, by name.
 
         Args:
-            duration: of a log's longest episode [s]; infinite if it is not known.
+            reach: of the log.
         """
         return shape_parameters(cls)
 

@@ -55,7 +55,7 @@ class GrowingLog(ExperimentLog):
     def reality(self) -> dict[str, Any]:
         """What experiments are performed on: plain data, of a simulation all of it."""
         kind = self._laboratory.station.kind
-        return {"station": kind} | ({} if kind == "hardware" else self._real)
+        return {"station": kind, "scenario": self._real if kind != "hardware" else None}
 
     @property
     def limits(self) -> SafetyConfig | None:

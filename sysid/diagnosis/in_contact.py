@@ -26,7 +26,7 @@ from drake_disasm.safety import SafetyConfig
 from drake_disasm.scenario import Scenario
 from drake_disasm.twin.steps import noise_free
 from sysid.diagnosis.design import Forecast
-from sysid.diagnosis.rivals import TwinRival
+from sysid.diagnosis.rivals import AS_IT_IS, TwinRival
 from sysid.models.base import Array
 from sysid.models.transitions import FORCE_ERROR, POSE_NOISE
 from sysid.models.twin import with_impact_as_stiff
@@ -85,6 +85,17 @@ def twin_forecasts(
             )
         )
     return found
+
+
+def forecasts_as_it_is(
+    plans: Sequence[Plan],
+    scenario: Scenario,
+    limits: SafetyConfig | None = None,
+    progress: Progress = ignore_progress,
+) -> list[Forecast]:
+    """Returns what the model alone predicts of experiments; see `twin_forecasts`."""
+    alone = [TwinRival(AS_IT_IS, 1.0, 0.0, scenario)]
+    return twin_forecasts(plans, alone, limits, progress)
 
 
 def _performed(

@@ -300,6 +300,8 @@ class _Session:
         """Records what the first verdict needs, as far as the log lacks it."""
         subject = self._subject
         plans = subject.first()[subject.log.episodes :]
+        if not plans:
+            return
         foreseen = subject.foreseen(plans)
         self._refuse(plans, foreseen, budget)
         for plan, (duration, _) in zip(plans, foreseen, strict=True):
@@ -322,7 +324,7 @@ class _Session:
                     f"{plan.text}, before the first verdict, is not performed: {hazard}"
                 )
         needed = self.first_time + sum(duration for duration, _ in foreseen)
-        if plans and needed > budget.robot:
+        if needed > budget.robot:
             raise DisasmError(
                 f"budget: {budget.robot:g} s of robot time; recordings before the "
                 f"first verdict take about {needed:.0f} s, give more"

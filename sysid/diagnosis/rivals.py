@@ -314,7 +314,8 @@ def unseen_rivals(
 
     An effect that its fit leaves at no size is one of a size that matters, in the field
     in which more of the log would show it soonest, unless the log speaks against that.
-    Where something is named, that is all that was asked; nothing is asked three times.
+    Where something is named, that is all that was asked; and after three experiments
+    about what is unseen, that nothing is.
 
     Args:
         closed: the verdict.

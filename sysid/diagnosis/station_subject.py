@@ -10,12 +10,10 @@ from drake_disasm.experiments import Experiment, Plan, Removal, registered_exper
 from drake_disasm.scenario import Scenario, scenario_to_mapping
 from sysid.diagnosis.design import Prediction, predict
 from sysid.diagnosis.growing_log import GrowingLog
-from sysid.diagnosis.in_contact import twin_forecasts
+from sysid.diagnosis.in_contact import forecasts_as_it_is, twin_forecasts
 from sysid.diagnosis.rivals import (
-    AS_IT_IS,
     Need,
     Rival,
-    TwinRival,
     open_rivals,
     twin_rival,
     unseen_rivals,
@@ -52,11 +50,8 @@ class StationSubject(Subject):
 
     def foreseen(self, plans: Sequence[Plan]) -> list[tuple[float, str]]:
         """See Subject."""
-        if not plans:
-            return []
-        alone = [TwinRival(AS_IT_IS, 1.0, 0.0, self._scenario)]
-        limits = self._log.limits
-        found = twin_forecasts(plans, alone, limits, self._progress)
+        limits, progress = self._log.limits, self._progress
+        found = forecasts_as_it_is(plans, self._scenario, limits, progress)
         return [(each.duration, each.hazard) for each in found]
 
     def plans(self) -> list[Plan]:

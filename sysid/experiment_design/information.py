@@ -12,6 +12,7 @@ from drake_disasm.effects import (
     ArmEffect,
     DelayEffect,
     Effect,
+    Reach,
     amplitudes,
     registered_effects,
 )
@@ -212,7 +213,7 @@ def _amplitudes(
         if name not in known:
             remedy = closest(name, list(known))
             raise DisasmError(f"effect {name}: no arm's torques show it; {remedy}")
-        for effect in at_null(known[name], joints, duration):
+        for effect in at_null(known[name], joints, Reach(duration)):
             assert isinstance(effect, ArmEffect)
             found.setdefault(_name(effect), effect)
     return [(e, field) for e in found.values() for field in amplitudes(type(e))]

@@ -139,14 +139,9 @@ class LogModel(abc.ABC):
         return tuple(channel.name for channel in self.measurements.channels)
 
     @property
-    def duration(self) -> float:
-        """Of the longest episode, in the time of effects [s]; infinite: not known."""
-        return np.inf
-
-    @property
     def reach(self) -> Reach:
-        """How far the log goes."""
-        return Reach(self.duration)
+        """How far the log goes, in the time of effects."""
+        return Reach()
 
     @property
     def travel(self) -> Mapping[str, float]:
@@ -190,7 +185,7 @@ class LogModel(abc.ABC):
             for kind in library
             if issubclass(kind, self.effect_types)
             if kind.is_physical and not kind.is_random
-            for effect in at_null(kind, self.joints, self.duration)
+            for effect in at_null(kind, self.joints, self.reach)
             if is_shown(effect, travel, one_way)
         ]
 

@@ -188,11 +188,6 @@ class ChangedModel(LogModel):
         return self.newer.joints
 
     @property
-    def duration(self) -> float:
-        """See LogModel."""
-        return self.newer.duration
-
-    @property
     def reach(self) -> Reach:
         """See LogModel."""
         return self.newer.reach

@@ -12,23 +12,24 @@ from numpy.typing import NDArray
 from drake_disasm.effects import ArmEffect, Effect, Reach
 from sysid.parameters import Parameter
 
+_UNKNOWN = Reach()
 _RESTS = 0.05  # of the greatest speed: noise of a filtered velocity is no motion
 _NEXT_TO_NOTHING = 0.02  # of the rows that move
 
 
 def at_null(
-    kind: type[Effect], joints: Sequence[str], duration: float = math.inf
+    kind: type[Effect], joints: Sequence[str], reach: Reach = _UNKNOWN
 ) -> list[Effect]:
     """Returns a class of effects at null, in every place and shape.
 
     Args:
         kind: an effect at a joint is made for each joint, any other once.
         joints: their names.
-        duration: of the longest episode [s]; infinite if it is not known.
+        reach: of the log.
     """
     make: Callable[..., Effect] = kind
     places = kind.places(joints)
-    grids = kind.grids(duration)
+    grids = kind.grids(reach)
     return [
         make(**place, **dict(zip(grids, shape, strict=True)))
         for place in places

@@ -14,6 +14,7 @@ from drake_disasm.devices.sensor_chain import Payload, sensed
 from drake_disasm.effects import (
     Effect,
     PayloadError,
+    Reach,
     Sensing,
     SensorEffect,
     SensorMemoryEffect,
@@ -155,9 +156,9 @@ class StaticWrenchModel(ScenarioModel):
         return np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
 
     @property
-    def duration(self) -> float:
+    def reach(self) -> Reach:
         """See LogModel."""
-        return float(self._time.max())
+        return Reach(float(self._time.max()))
 
     @property
     def noise_groups(self) -> tuple[str, ...]:

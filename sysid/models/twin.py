@@ -22,7 +22,7 @@ from drake_disasm.effects import (
 )
 from drake_disasm.logs import Log
 from drake_disasm.logs.schema import WRENCH
-from drake_disasm.scenario import Scenario
+from drake_disasm.scenario import Scenario, with_values
 from drake_disasm.scenario.names import find_field
 from drake_disasm.twin.contact_step import NO_BALANCE
 from drake_disasm.twin.steps import Steps
@@ -118,13 +118,16 @@ class TwinModel(SimulatedModel):
         own = any(each.path.startswith("contact.impact") for each in self.parameters)
         if error is None or own or model.rollout or model.costly:
             return measured
-        about = (1.0 - _STIFFNESS_ERROR, 1.0 + _STIFFNESS_ERROR)
-        scenarios = [_with_stiffness(model.scenario, share) for share in about]
+        scenario, name = model.scenario, "contact.impact.stiffness"
+        shares = 1.0 + _STIFFNESS_ERROR * np.array([-1.0, 1.0])
+        about = (scenario.contact.impact.stiffness * shares).tolist()
         try:
             model = model._led_without_sensor()
             soft, stiff = (
-                model.replace(scenario=scenario).predictions(np.zeros(0))
-                for scenario in scenarios
+                model.replace(scenario=with_values(scenario, {name: k})).predictions(
+                    np.zeros(0)
+                )
+                for k in about
             )
         except FAILURES:
             return measured
@@ -208,17 +211,12 @@ class TwinModel(SimulatedModel):
         )
 
     @property
-    def duration(self) -> float:
-        """See LogModel."""
-        steps = self._transitions.steps.index.max() + 1
-        return float(steps * self._transitions.period)
-
-    @property
     def reach(self) -> Reach:
         """See LogModel."""
         steps = self._transitions.steps
+        duration = (steps.index.max() + 1) * self._transitions.period
         speed = np.linalg.norm(steps.qd_rate[:, :3], axis=1).max()
-        return Reach(self.duration, float(np.ptp(steps.q[:, 0])), float(speed))
+        return Reach(float(duration), float(np.ptp(steps.q[:, 0])), float(speed))
 
     @property
     def costly(self) -> bool:
@@ -331,18 +329,13 @@ class TwinModel(SimulatedModel):
             theta: (p,) values of `parameters`.
             whole: all transitions.
         """
-        model, known = self.surrogate(), whole
+        model = self.surrogate()
         if model.costly:
             return whole
-        observer, rows = self._observer, self._transitions.rows
-        ends, read = rows[whole.steps.index[rows] > 0], whole.read(self.reading)
-        for _ in range(_PASSES):
-            if not len(ends):
-                break
-            led = model.replace(_whole=known, _displacement=None)._ends(theta, ends - 1)
-            before, known = known, observer.corrected(known, ends, led, read)
-            ends = ends[observer.changed(known, before)[ends - 1]]
-        change = observer.change(known.select(rows), self._transitions)
+        rows = self._transitions.rows
+        ends = rows[whole.steps.index[rows] > 0]
+        known = model._begun_where_led(theta, whole, ends)
+        change = self._observer.change(known.select(rows), self._transitions)
         is_new = not self._whole.seen.any()
         noticeable = is_new or np.mean(change**2, axis=0).max() > 1.0
         return known if noticeable or whole is not self._whole else self._whole
@@ -352,13 +345,37 @@ class TwinModel(SimulatedModel):
 
         With the grip as the model has it, whatever the sensor reads.
         """
-        known, theta, observer = self._whole, np.zeros(0), self._observer
-        ends, read = np.flatnonzero(known.steps.index > 0), known.read(self.reading)
-        for _ in range(_PASSES):
-            led = self.replace(_whole=known)._ends(theta, ends - 1)
-            read[ends, 6:] = led.states[:, 6:]
-            known = observer.corrected(known, ends, led, read)
+        whole = self._whole
+        ends = np.flatnonzero(whole.steps.index > 0)
+        known = self._begun_where_led(np.zeros(0), whole, ends, is_blind=True)
         return self.replace(_whole=known, _transitions=known)
+
+    def _begun_where_led(
+        self,
+        theta: Array,
+        known: Transitions,
+        ends: NDArray[np.int64],
+        is_blind: bool = False,
+    ) -> Transitions:
+        """Returns all transitions, some of which begin where the step before has led.
+
+        Args:
+            theta: (p,) values of `parameters`.
+            known: all transitions.
+            ends: (n,) numbers of those that begin so; none is an episode's first.
+            is_blind: whether the model is believed instead of the sensor.
+        """
+        observer, read = self._observer, known.read(self.reading)
+        for _ in range(_PASSES):
+            if not len(ends):
+                break
+            led = self.replace(_whole=known, _displacement=None)._ends(theta, ends - 1)
+            if is_blind:
+                read[ends, 6:] = led.states[:, 6:]
+            before, known = known, observer.corrected(known, ends, led, read)
+            if not is_blind:
+                ends = ends[observer.changed(known, before)[ends - 1]]
+        return known
 
     def _ends(self, theta: Array, rows: NDArray[np.int64]) -> Led:
         """Returns where some steps of the log lead, by their numbers (n,)."""
@@ -505,14 +522,6 @@ def _kept(found: dict[str, _T], key: str, compute: Callable[[], _T]) -> _T:
             del found[next(iter(found))]
         found[key] = compute()
     return found[key]
-
-
-def _with_stiffness(scenario: Scenario, share: float) -> Scenario:
-    """Returns a scenario whose IMPACT has a share of its stiffness."""
-    impact = scenario.contact.impact
-    impact = dataclasses.replace(impact, stiffness=share * impact.stiffness)
-    contact = dataclasses.replace(scenario.contact, impact=impact)
-    return dataclasses.replace(scenario, contact=contact)
 
 
 def with_impact_as_stiff(scenario: Scenario) -> Scenario:

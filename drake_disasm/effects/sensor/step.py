@@ -53,11 +53,11 @@ class SensorStep(SensorEffect):
         return {"rise": _SLOWEST * reach.duration / _PARTS}
 
     @classmethod
-    def grids(cls, duration: float) -> dict[str, tuple[float, ...]]:
+    def grids(cls, reach: Reach) -> dict[str, tuple[float, ...]]:
         """See Effect: steps so far apart, and so slow, that each finds its nearest."""
-        if not np.isfinite(duration):
-            return super().grids(duration)
-        part = duration / _PARTS
+        if not np.isfinite(reach.duration):
+            return super().grids(reach)
+        part = reach.duration / _PARTS
         onsets = part * (np.arange(1.0, _PARTS) - 0.5)
         return {"onset": tuple(onsets.tolist()), "rise": (part,)}
 

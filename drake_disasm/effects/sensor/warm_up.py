@@ -43,9 +43,9 @@ class SensorWarmUp(SensorEffect):
         return {"time_constant": _SLOWEST * reach.duration}
 
     @classmethod
-    def grids(cls, duration: float) -> dict[str, tuple[float, ...]]:
+    def grids(cls, reach: Reach) -> dict[str, tuple[float, ...]]:
         """See Effect: those that are no drift."""
-        slowest = cls.greatest_shapes(Reach(duration))["time_constant"]
+        slowest = cls.greatest_shapes(reach)["time_constant"]
         usual = tuple(value for value in _GRID if value < slowest)
         ends = (slowest,) if slowest < _GRID[-1] else ()
         return {"time_constant": (*usual, *ends)}
