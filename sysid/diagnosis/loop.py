@@ -89,7 +89,8 @@ class Diagnosis:
         first_time: robot time before the first verdict [s].
         predictions: of the last round's experiments, the best first.
         rivals: of the last round.
-        is_refuted: whether no name stands: experiments refuted one after the other.
+        is_refuted: whether no name stands: experiments refuted one after the other, or
+            the last leaves more than noise and the model's own errors.
     """
 
     rounds: tuple[Round, ...]
@@ -162,7 +163,7 @@ def pursue(
                 session.first_time,
                 tuple(predictions),
                 rivals,
-                is_refuted,
+                is_refuted or _leaves_more(closed),
             )
         session.experiment(closed, rivals, best)
 
@@ -211,9 +212,26 @@ def _settled(closed: ClosedLoop) -> str:
     if closed.verdict.ending == "unexplained":
         return "what the model lacks is not in the library"
     names = short_names(closed.verdict.confirmed) or NOTHING
+    if _leaves_more(closed):
+        return (
+            f"what the model lacks is not in the library; {names} comes nearest, and "
+            "leaves more than noise and the model's own errors"
+        )
     if closed.verdict.ending == "partly":
         names += ", and something that is not in the library"
     return f"settled: the model lacks {names}"
+
+
+def _leaves_more(closed: ClosedLoop) -> bool:
+    """Returns whether names leave more than they may.
+
+    Where the model's own errors are stated beside the noise, what is beyond is there.
+    Another effect that the library has would have been named beside: either there is
+    one that it lacks, which these names stand for, or there are these and one more.
+    """
+    verdict, measured = closed.verdict, closed.last.model.measurements
+    is_left = verdict.has_remainder and measured.model_error is not None
+    return bool(verdict.confirmed) and is_left
 
 
 def refuted_names(

@@ -170,6 +170,18 @@ class Verdict:
         return self._of_status("suggested")
 
     @property
+    def has_remainder(self) -> bool:
+        """Whether effects leave more than single rows."""
+        return bool(
+            self.contradictions
+            or self.excess
+            or any(not each.is_of_rows for each in self.findings)
+            or self.predictable_residual
+            or self.misfits
+            or self.invalid
+        )
+
+    @property
     def undetectable(self) -> dict[str, str]:
         """Kinds of effects that the log could not have shown, and what would."""
         return undetectable(self.limits)
@@ -232,16 +244,7 @@ def _ordered(placed: Sequence[Standing]) -> tuple[Standing, ...]:
 def _ending(found: Verdict, last: Fit) -> Ending:
     limits = last.settings
     is_large = found.relative_error > limits.max_relative_error
-    left = bool(
-        found.contradictions
-        or found.excess
-        or found.findings
-        or found.predictable_residual
-        or found.misfits
-        or found.invalid
-        or found.suggested
-        or is_large
-    )
+    left = bool(found.has_remainder or found.findings or found.suggested or is_large)
     if found.confirmed or found.ambiguous:
         return "partly" if left else "explained"
     if left:

@@ -41,10 +41,12 @@ class ChannelFinding:
     Attributes:
         channel: its name.
         text: what it is, in words.
+        is_of_rows: whether it is of single rows.
     """
 
     channel: str
     text: str
+    is_of_rows: bool = False
 
 
 def channel_findings(fit: Fit) -> list[ChannelFinding]:
@@ -57,8 +59,8 @@ def channel_findings(fit: Fit) -> list[ChannelFinding]:
         rows = _outlying(r, measured, max(_NEAR_ROW, least) if least else 0.0)
         line = _line(r, measured, least)
         excess = _excess(r, measured, fit.settings) if fit.noise_is_stated else ""
-        texts = (text for text in (rows, line, excess) if text)
-        found += [ChannelFinding(channel.name, text) for text in texts]
+        texts = ((rows, True), (line, False), (excess, False))
+        found += [ChannelFinding(channel.name, *each) for each in texts if each[0]]
     return found
 
 
