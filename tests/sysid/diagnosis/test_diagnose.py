@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from drake_disasm.effects import SensorDrift, SensorGain, SensorWarmUp
+from drake_disasm.effects import SensorBias, SensorDrift, SensorGain, SensorWarmUp
 from drake_disasm.experiments import Presses, Rest, Reversals
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
@@ -114,3 +114,20 @@ def test_the_first_recording_is_run_on_the_twin_before(tmp_path: Path) -> None:
     with refused("Removal", "is not performed", "under the model as it is"):
         diagnose(weak, tmp_path, station="twin", **FEW)
     assert not list((tmp_path / "log").glob("*.parquet"))
+
+
+def test_a_name_that_leaves_more_than_noise_is_not_what_it_lacks(
+    tmp_path: Path,
+) -> None:
+    """A bias comes nearest to a warm-up that the library lacks."""
+    hidden = SensorWarmUp(fz=3.0, time_constant=12.0)
+    found = diagnose(
+        IMPACT,
+        tmp_path,
+        real=dataclasses.replace(load_scenario("removal"), effects=[hidden]),
+        effects=(SensorBias,),
+        experiments=(Rest,),
+    )
+    assert found.closed.verdict.confirmed == ("SensorBias",)
+    assert found.names == () and not found.is_settled
+    assert "SensorBias comes nearest" in found.reason
