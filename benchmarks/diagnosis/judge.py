@@ -152,11 +152,18 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _numbers(group: str, worlds: Sequence[int]) -> Sequence[int]:
-    """Returns the numbers of the worlds that are asked for."""
+    """Returns the numbers of the worlds that are asked for.
+
+    Raises:
+        DisasmError: the group has none of a number.
+    """
     every = range(GROUPS[group][1])
-    if len(worlds) > 2:
-        return [number for number in worlds if number in every]
-    return every[slice(*worlds)] if worlds else every
+    few = range(*worlds) if 0 < len(worlds) < 3 else worlds or every
+    if beyond := [number for number in few if number not in every]:
+        raise DisasmError(
+            f"--worlds: {group} has those from 0 to {every[-1]}, and no {beyond[0]}"
+        )
+    return few
 
 
 def _job(
