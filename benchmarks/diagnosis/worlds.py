@@ -33,7 +33,7 @@ _SEEDS = 1000  # of noise in each world
 _PARTS = ("removal", "iiwa_peg", "iiwa_bayonet")
 #: Of each group: first seed, and how many worlds there are.
 GROUPS: Mapping[str, tuple[int, int]] = {
-    "pairs": (100, 70),
+    "pairs": (100, 100),
     "null": (200, 20),
     "missing": (300, 20),
     "parts": (400, 60),
@@ -77,7 +77,7 @@ SIZES: Mapping[str, Sizes] = {
     "GrooveStribeckFriction": Sizes({"coefficient": (0.3, 0.5)}, False, _SLIP),
     "SensorGain": Sizes({"fx": (0.15, 0.35)}),
     "PayloadError": Sizes({"mass": (0.5, 0.9), "cy": (0.04, 0.07)}),
-    "SensorDelay": Sizes({"delay": (0.05, 0.12)}, False),
+    "SensorDelay": Sizes({"delay": (0.05, 0.12)}, False, {"share": (1.0, 1.0)}),
     "SensorLag": Sizes({"share": (0.9, 1.0)}, False, {"time_constant": (0.1, 0.4)}),
     "Backlash": Sizes(dict.fromkeys("yz", (1e-4, 3e-4)), False),
     "Compliance": Sizes(dict.fromkeys("xy", (3.2e-5, 3.9e-5)), False),

@@ -9,7 +9,8 @@ from drake_disasm.common.arrays import Array, namespace
 from drake_disasm.common.spatial import weight_wrench
 from drake_disasm.effects import Sensing, SensorEffect, SensorMemoryEffect
 
-_SAMPLES = 10  # of the sensor between two loads of a trajectory
+#: Samples of the sensor between two loads of a trajectory.
+BETWEEN = 9
 
 #: Reads a load (..., 6) through the i-th effect of a chain, which has a memory.
 ReadMemory = Callable[[int, SensorMemoryEffect, Array], Array]
@@ -121,6 +122,7 @@ def sensed_along(
     sensing: Sensing,
     at_rest: Array,
     rest: Sensing,
+    between: Array | None = None,
 ) -> Array:
     """Returns what a sensor reads of loads one after the other, (n, 6) [f; tau] in S.
 
@@ -130,12 +132,16 @@ def sensed_along(
         sensing: of the loads; its times (n,) start anew in each episode.
         at_rest: (6,) the load before an episode begins.
         rest: the circumstances then.
+        between: (n, BETWEEN, 6) by how much loads on the way from the one before,
+            evenly in time, are off the straight line; nothing if left out.
     """
+    between = np.zeros((len(loads), BETWEEN, 6)) if between is None else between
 
     def read(i: int, effect: SensorMemoryEffect, loads: Array) -> Array:
         """Reads all loads, from what reaches this effect at rest."""
         times = np.asarray(sensing.time)
-        return _along(effect, loads, sensed(at_rest, effects[:i], rest), times)
+        before = sensed(at_rest, effects[:i], rest)
+        return _along(effect, loads, before, times, between)
 
     return sensed(loads, effects, sensing, read)
 
@@ -145,14 +151,22 @@ def _along(
     loads: Array,
     at_rest: Array,
     times: Array,
+    between: Array,
 ) -> Array:
     """Returns what an effect with a memory reads of loads (n, 6), each in its turn.
 
-    Between two of them the load changes linearly. An episode begins at rest. Episodes
-    are read side by side.
+    An episode begins at rest. Episodes are read side by side.
     """
     begins = np.flatnonzero(np.diff(times, prepend=np.inf) <= 0.0)
     lengths = np.diff(begins, append=len(times))
+    episodes = [slice(b, b + n) for b, n in zip(begins, lengths, strict=True)]
+    found_at_once = [
+        effect.along(*_samples(loads[e], at_rest, times[e], between[e]))
+        for e in episodes
+    ]
+    whole = [each for each in found_at_once if each is not None]
+    if len(whole) == len(episodes):
+        return np.concatenate([each[BETWEEN + 1 :: BETWEEN + 1] for each in whole])
     found, previous = np.empty_like(loads), np.tile(at_rest, (len(begins), 1))
     memory, before = effect.begin(previous).copy(), np.zeros(len(begins))
     for k in range(int(lengths.max(initial=0))):
@@ -163,11 +177,35 @@ def _along(
             own = intervals == interval
             e, row = reading[own], rows[own]
             memory[e] = _remembered(
-                effect, memory[e], previous[e], loads[row], interval
+                effect, memory[e], previous[e], loads[row], between[row], interval
             )
             found[row] = effect.read(loads[row], memory[e])
         previous[reading], before[reading] = loads[rows], times[rows]
     return found
+
+
+def _samples(
+    loads: Array, at_rest: Array, times: Array, between: Array
+) -> tuple[Array, Array]:
+    """Returns all loads of an episode, those in between included, and their times.
+
+    The first is that at rest.
+
+    Args:
+        loads: (n, 6).
+        at_rest: (6,) before them, at time zero.
+        times: (n,) [s].
+        between: (n, BETWEEN, 6) by how much loads are off the straight line.
+    """
+    share = np.arange(1, BETWEEN + 2) / (BETWEEN + 1)
+    before, since = np.vstack([at_rest, loads[:-1]]), np.diff(times, prepend=0.0)
+    all_loads = before[:, None] + share[:, None] * (loads - before)[:, None]
+    all_loads[:, :-1] += between
+    all_times = times[:, None] - since[:, None] * (1.0 - share)
+    return (
+        np.vstack([at_rest, all_loads.reshape(-1, 6)]),
+        np.concatenate([np.zeros(1), all_times.ravel()]),
+    )
 
 
 def _remembered(
@@ -175,6 +213,7 @@ def _remembered(
     memory: Array,
     before: Array,
     now: Array,
+    between: Array,
     interval: float,
 ) -> Array:
     """Returns what an effect remembers (e, m) after a while with loads in between.
@@ -183,9 +222,12 @@ def _remembered(
         effect: with a memory.
         memory: (e, m).
         before, now: (e, 6) loads at the begin and at the end of the while.
+        between: (e, BETWEEN, 6) by how much loads are off the line from one to other.
         interval: its length [s].
     """
-    for part in np.arange(1, _SAMPLES + 1) / _SAMPLES:
-        load = before + part * (now - before)
-        memory = effect.remember(memory, load, interval / _SAMPLES)
+    count = BETWEEN + 1
+    off = np.concatenate([between, np.zeros((len(now), 1, 6))], axis=1)
+    for k in range(count):
+        load = before + (k + 1) / count * (now - before) + off[:, k]
+        memory = effect.remember(memory, load, interval / count)
     return memory

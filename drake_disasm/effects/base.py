@@ -393,6 +393,15 @@ class SensorMemoryEffect(SensorEffect, abc.ABC):
     def read(self, wrench_S: Array, memory: Array) -> Array:
         """Returns the reading (..., 6) of a load with the memory (..., m) up to now."""
 
+    def along(self, wrench_S: Array, times: Array) -> Array | None:
+        """Returns the readings (n, 6) of a whole episode, if they are had at once.
+
+        Args:
+            wrench_S: (n, 6) the loads, the first of them after a long rest.
+            times: (n,) of the loads, in ascending order [s].
+        """
+        return None
+
 
 @dataclasses.dataclass(frozen=True)
 class JointSamples:

@@ -2,6 +2,9 @@
 
 import dataclasses
 
+import numpy as np
+from scipy.linalg import solve_banded
+
 from drake_disasm.common.arrays import Array, exponential
 from drake_disasm.effects.base import SensorMemoryEffect
 from drake_disasm.effects.fields import amplitude, shape_parameter
@@ -39,3 +42,10 @@ class SensorLag(SensorMemoryEffect):
     def read(self, wrench_S: Array, memory: Array) -> Array:
         """Returns the reading."""
         return wrench_S + self.column("share") * (memory - wrench_S)
+
+    def along(self, wrench_S: Array, times: Array) -> Array:
+        """Returns the readings: f_k - s_k f_(k-1) = (1 - s_k) F_k, a band of two."""
+        stays = np.exp(-np.diff(times, prepend=-np.inf) / self.time_constant)
+        band = np.stack([np.ones(len(stays)), -np.append(stays[1:], 0.0)])
+        found = solve_banded((1, 0), band, (1.0 - stays)[:, None] * wrench_S)
+        return wrench_S + self.share * (found - wrench_S)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drake_disasm import effects as ef
-from drake_disasm.devices.sensor_chain import sensed_along, sensed_sample
+from drake_disasm.devices.sensor_chain import BETWEEN, sensed_along, sensed_sample
 
 G_W = np.array([0.0, 0.0, -9.81])
 WRENCH = np.array([1.0, -0.2, 3.0, 0.04, -0.005, 0.1])
@@ -61,7 +61,7 @@ def _along(effect: ef.SensorEffect, loads: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("steps", [1, 3])
 def test_a_delay_by_whole_samples_shifts_rows(steps: int) -> None:
     loads = _loads(8)
-    read = _along(ef.SensorDelay(steps * _PERIOD), loads)
+    read = _along(ef.SensorDelay(1.0, steps * _PERIOD), loads)
     np.testing.assert_allclose(read[steps:], loads[:-steps], atol=1e-9)
     np.testing.assert_allclose(read[: steps - 1], 0.0, atol=1e-9)
 
@@ -70,14 +70,38 @@ def test_a_delay_by_whole_samples_shifts_rows(steps: int) -> None:
 def test_a_delay_of_less_is_on_the_line_between_two_samples(delay: float) -> None:
     """No first-order lag: what was before the sample before does not show."""
     loads, share = _loads(8), delay / _PERIOD
-    read = _along(ef.SensorDelay(delay), loads)
+    read = _along(ef.SensorDelay(1.0, delay), loads)
     expected = (1.0 - share) * loads[1:] + share * loads[:-1]
     np.testing.assert_allclose(read[1:], expected, atol=1e-9)
 
 
+@pytest.mark.parametrize("effect", [ef.SensorDelay(0.8, 0.07), ef.SensorLag(0.8, 0.2)])
+def test_an_episode_at_once_is_read_as_sample_by_sample(
+    effect: ef.SensorMemoryEffect, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loads, steps = _loads(60), np.r_[1:41, 1:21]
+    between = np.random.default_rng(1).standard_normal((60, BETWEEN, 6))
+    sensing, rest = _at(*(_PERIOD * steps)), _at(0.0)
+    given = loads, [effect], sensing, np.zeros(6), rest, between
+    at_once = sensed_along(*given)
+    monkeypatch.setattr(type(effect), "along", lambda *_: None)
+    np.testing.assert_allclose(at_once, sensed_along(*given), atol=1e-9)
+
+
+def test_a_late_sensor_reads_what_was_between_two_loads() -> None:
+    """Where loads are off the line by as much on the way, and a delay ends there."""
+    between = np.zeros((8, BETWEEN, 6))
+    between[:, BETWEEN // 2] = 1.0
+    times = _at(*(_PERIOD * np.arange(1.0, 9.0)))
+    effect = ef.SensorDelay(1.0, _PERIOD / 2.0)
+    given = _loads(8), [effect], times, np.zeros(6), _at(0.0)
+    change = sensed_along(*given, between) - sensed_along(*given)
+    np.testing.assert_allclose(change, 1.0, atol=1e-9)
+
+
 @pytest.mark.parametrize("interval", [0.002, 0.025])
 def test_a_sensor_of_any_rate_delays_a_ramp_exactly(interval: float) -> None:
-    effect, memory = ef.SensorDelay(0.25), np.full(512, np.nan)
+    effect, memory = ef.SensorDelay(1.0, 0.25), np.full(512, np.nan)
     for k in range(round(1.0 / interval) + 1):
         load = np.full(6, k * interval)
         gap = interval if k else 0.0

@@ -28,7 +28,7 @@ EFFECTS: list[ef.Effect] = [
     ef.SensorGainDrift(fx=0.1, fz=0.05),
     ef.SensorCrossTalk(fx_fz=0.1, fz_tx=2.0, tx_fy=0.02, ty_tz=0.2),
     ef.SensorLag(share=1.0, time_constant=0.15),
-    ef.SensorDelay(delay=0.13),
+    ef.SensorDelay(share=0.9, delay=0.13),
     ef.SensorHysteresis(share=0.7, width=0.5),
     ef.SensorSaturation(share=1.0, limit=1.5),
     ef.SensorDeadBand(force=1.0, torque=1.0, width=0.4, beyond=0.5),

@@ -58,10 +58,12 @@ def test_each_is_named_first_of_the_whole_library(effect, tmp_path):
 @pytest.mark.slow
 def test_a_wrench_that_is_rows_late_is_found_far_from_the_data(tmp_path):
     library = [SensorDelay, SensorDeadBand, CommandGain]
-    verdict = close_loop(_model(tmp_path, [SensorDelay(0.1)]), library=library).verdict
+    model = _model(tmp_path, [SensorDelay(1.0, 0.1)])
+    verdict = close_loop(model, library=library).verdict
     assert (verdict.ending, verdict.names) == ("explained", ("SensorDelay",))
-    (value,) = verdict.values
-    assert value.value == pytest.approx(0.1, abs=1e-3)
+    share, delay = verdict.values
+    assert share.value == pytest.approx(1.0, abs=1e-2)
+    assert delay.value == pytest.approx(0.1, abs=1e-3)
 
 
 @pytest.mark.slow

@@ -81,7 +81,7 @@ def _error(log, scenario):
         BoltSlip(x=3e-4),
         PoseDelay(0.13),
         SensorMounting(ry=0.1),
-        SensorDelay(0.1),
+        SensorDelay(1.0, 0.1),
         SensorGainDrift(fx=0.2, ty=0.2),
     ],
     ids=lambda effect: type(effect).__name__,
