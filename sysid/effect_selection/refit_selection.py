@@ -138,9 +138,11 @@ class RefitSelection:
     def _best_shapes(self, system: LinearSystem) -> list[Gain]:
         """Returns each effect in the shape that gains most by the linear account.
 
-        Those that gain nothing by it come last.
+        Those that gain nothing by it come last. One that would have to be larger than
+        it may be is none of them: a fit stops at the bound, where a share is all.
         """
-        gains = ranked(system.equations(), system.terms, self._settings)
+        equations = system.equations().bounded_at_null()
+        gains = ranked(equations, system.terms, self._settings)
         one = np.ones(1)
         nothing = [Gain.of(term, one, one) for term in system.terms]
         best: dict[_Names, Gain] = {}

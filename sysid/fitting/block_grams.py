@@ -11,6 +11,7 @@ import dataclasses
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ Columns = NDArray[np.int64]
 
 # Numerical guards, not thresholds.
 _RIDGE = 1e-9  # of the diagonal, against columns that depend on each other
+_AT_NULL = 1e-6  # of a parameter's range: bounds nearer than that are zero
 _SPANNED = 1e-4  # of a column's power: less than that is new beside others
 
 
@@ -232,6 +234,11 @@ class NormalEquations:
                 break
             kept = kept[~wrong]
         return kept
+
+    def bounded_at_null(self) -> Self:
+        """Returns the same, of coefficients that have no bound but zero."""
+        none = np.where(np.abs(self.bounds) > _AT_NULL, np.inf, np.abs(self.bounds))
+        return dataclasses.replace(self, bounds=none * [-1.0, 1.0])
 
     def held_out(self, columns: Columns) -> Array:
         """Returns the loss of each block (B,) with columns fitted to all others."""

@@ -131,6 +131,16 @@ def test_columns_whose_coefficients_would_leave_their_bounds_are_left_out(data):
         assert found.tolist() == expected
 
 
+def test_a_coefficient_beyond_the_bound_that_is_not_null_is_kept(data):
+    grams, x = data.grams(), data.equations().solution(np.arange(_P))
+    bounds = np.tile([-np.inf, np.inf], (_P, 1))
+    for bound, expected in ((0.5, [0, 1, 2, 3, 4]), (-0.5, [0, 1, 2, 4])):
+        bounds[3] = sorted([0.0, bound * x[3]])
+        own = BlockGrams(grams.grams, grams.rows, grams.episode, bounds)
+        equations = own.weighted(data.of_channels).bounded_at_null()
+        assert equations.feasible(np.arange(_P)).tolist() == expected
+
+
 def test_blocks_are_contiguous_and_span_episodes_only_where_there_are_many():
     episode = np.repeat(np.arange(5), [10, 200, 30, 5, 55])
     blocks = blocks_of(episode, 48)
