@@ -63,6 +63,7 @@ class SensorReading:
         mounting: of the sensor, with what hangs on the log's: the gripper and the bolt,
             or bolt and fingers alone if it is the twin's; or the fixed part on it.
         payload: the same load.
+        station: where the log was recorded.
 
     Processing takes the reading at zeroing off, and the change of the known weight
     since then (`contact_wrench`); so what effects add to readings, and to the
@@ -77,6 +78,7 @@ class SensorReading:
             tool: on the flange.
             station: where the log was recorded: "cell", "hardware", or the twin.
         """
+        self.station = station
         carried = tool.M_gripped_B
         of_twin = carried.get_mass(), tool.X_SB @ carried.get_com()
         of_log = of_twin
@@ -145,6 +147,7 @@ class SensorReading:
         states: Array,
         zero: Array,
         times: Array,
+        between: Array | None = None,
     ) -> Array:
         """Returns states (n, 12) whose wrench is read through effects.
 
@@ -153,12 +156,13 @@ class SensorReading:
             states: without them, the wrench at So in S.
             zero: (6,) the reading at zeroing, without them.
             times: (n,) since the episode began [s]; they start anew in each episode.
+            between: see `sensed_along`.
         """
         raw = self.raw(states, zero)
         sensing = self.sensing(states, times)
         [R_WS] = self.orientations(np.zeros((1, 6)))
         rest = self.payload.sensing(np.array(0.0), R_WS)
-        load = sensed_along(raw, effects, sensing, zero, rest)
+        load = sensed_along(raw, effects, sensing, zero, rest, between)
         seen = sensed_at_zeroing(zero, effects, rest)
         change = (load - raw) - (seen - zero)
         return np.hstack([states[:, :6], states[:, 6:] + change])

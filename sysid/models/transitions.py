@@ -25,7 +25,8 @@ from sysid.models.grip_state import GripState, of_encoders
 from sysid.models.late_pose import LatePoses
 from sysid.models.measured_episode import MeasuredEpisode
 from sysid.models.measurements import Channel, Measurements
-from sysid.models.sensor_reading import SensorReading, at_sensor, station_of
+from sysid.models.rate_response import rate_changes
+from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor, station_of
 from sysid.models.undo_sensor_effects import undo_sensor_effects
 
 #: Repeatability of a robot's own encoders within an episode, m and rad: below that of
@@ -71,6 +72,8 @@ class Transitions:
             without its offset.
         commands: of whole episodes, since effects on the motion have a memory.
         sway: (rows, 6) what moving loads the sensor with besides, at So in S.
+        rate_change: (rows, 6) of what is commanded, as a step begins: along and about
+            the axes of G [m/s, rad/s].
         elsewhere: (rows, 6) by how much the bolt is elsewhere in the grip as a step
             begins, in coordinates.
         seen: (steps, 12) of all steps of the episodes, by how much the grip's springs
@@ -88,6 +91,7 @@ class Transitions:
     episodes: tuple[MeasuredEpisode, ...]
     commands: tuple[Commands, ...]
     sway: Array
+    rate_change: Array
     elsewhere: Array
     seen: Array
     period: float
@@ -129,6 +133,7 @@ class Transitions:
             episodes=started,
             commands=tuple(Commands.of(e, period) for e in episodes),
             sway=np.concatenate([_sway(log, scenario, sensing) for log in logs]),
+            rate_change=np.concatenate([rate_changes(e, period) for e in episodes]),
             elsewhere=np.concatenate([each.elsewhere[:-1] for each in started]),
             seen=np.zeros((len(steps), 12)),
             period=period,
@@ -158,6 +163,29 @@ class Transitions:
         pairs = zip(episodes, self.episodes, strict=True)
         if not any(one.begins_elsewhere(other, _NOTICEABLE) for one, other in pairs):
             return self
+        return self._of(episodes)
+
+    def with_loads(self, states: Array, sensing: SensorReading) -> Self:
+        """Returns the transitions as they begin under other loads than were read.
+
+        Args:
+            states: (steps, 12) as all steps of the episodes begin, the wrench at So in
+                S, without effects and offset.
+            sensing: of the scenario.
+        """
+        wrench = at_bolt(states, sensing.mounting)[:, 6:]
+        parts = np.split(wrench, self._ends)
+        return self._of(
+            tuple(
+                dataclasses.replace(
+                    episode, wrench=np.vstack([own, episode.wrench[-1]])
+                )
+                for episode, own in zip(self.episodes, parts, strict=True)
+            )
+        )
+
+    def _of(self, episodes: tuple[MeasuredEpisode, ...]) -> Self:
+        """Returns the transitions of the same episodes under other loads."""
         steps = Steps.concatenated([e.steps() for e in episodes])
         steps = dataclasses.replace(
             steps,
@@ -215,6 +243,7 @@ class Transitions:
             before=self.before[mask],
             rows=self.rows[mask],
             sway=self.sway[mask],
+            rate_change=self.rate_change[mask],
             elsewhere=self.elsewhere[mask],
         )
 
@@ -254,23 +283,31 @@ class Transitions:
         Args:
             qd, qd_rate: (n, 6) commanded in all steps of the episodes.
         """
-        ends = np.cumsum([len(each.wrench) - 1 for each in self.episodes])[:-1]
-        rates = np.split(qd_rate, ends)
+        rates = np.split(qd_rate, self._ends)
         pairs = zip(self.episodes, rates, strict=True)
         moved = qd + np.concatenate([each.ahead(own) for each, own in pairs])
         return dataclasses.replace(
             self.steps, qd=moved[self.rows], qd_rate=qd_rate[self.rows]
         )
 
-    def of_encoders(self, states: Array, steps: Steps, rows: slice) -> Array:
+    @property
+    def _ends(self) -> NDArray[np.int64]:
+        """Numbers of the steps that follow an episode's last, but the last of all."""
+        lengths = [len(each.wrench) - 1 for each in self.episodes]
+        return np.asarray(np.cumsum(lengths)[:-1])
+
+    def of_encoders(
+        self, states: Array, steps: Steps, rows: slice, moves: Array
+    ) -> Array:
         """Returns the states (n, 12) after some steps as encoders have them.
 
         Args:
             states: of the twin, the wrench at Bo in G.
             steps: the transitions' steps, as they are executed.
             rows: which of them.
+            moves: (n, 6) by how much the arm is elsewhere for its posture.
         """
-        elsewhere = self.elsewhere[rows]
+        elsewhere = self.elsewhere[rows] - moves
         if not elsewhere.any():
             return states
         return of_encoders(states, steps.q[rows] - elsewhere, elsewhere, self.p_BoTo_B)

@@ -14,6 +14,7 @@ from drake_disasm.effects import (
     PoseEffect,
     Reach,
     SensorEffect,
+    SensorMemoryEffect,
     SensorResidualModel,
     motion_chain,
     pose_weights,
@@ -26,12 +27,14 @@ from drake_disasm.scenario import Scenario, with_values
 from drake_disasm.scenario.names import find_field
 from drake_disasm.twin.contact_step import NO_BALANCE
 from drake_disasm.twin.steps import Steps
+from sysid.models.arm_posture import ArmPosture
 from sysid.models.base import Array, PredictionError, even_chunks
 from sysid.models.bookkeeping import Frame
 from sysid.models.commands import bolt_path, twin_coordinates
 from sysid.models.grip_observer import GripObserver, Led
 from sysid.models.late_pose import LatePoses
 from sysid.models.measurements import Measurements
+from sysid.models.rate_response import RateResponse
 from sysid.models.replays import DiagramReplays, ImpactReplays, Replayed
 from sysid.models.sensor_reading import SensorReading, at_bolt, at_sensor
 from sysid.models.simulated_model import FAILURES, SimulatedModel
@@ -95,6 +98,8 @@ class TwinModel(SimulatedModel):
         self.parameters = tuple(parameters)
         self.scenario, self.rollout = scenario, rollout
         self.reading = SensorReading.of(logs, scenario)
+        self._response = RateResponse.of(scenario, self.reading.station)
+        self._posture = ArmPosture.of(scenario)
         recorded = Transitions.of(logs, scenario, self.reading)
         effects = sensor_chain(scenario.effects)
         self._whole = self._transitions = recorded.without_effects(
@@ -162,9 +167,15 @@ class TwinModel(SimulatedModel):
         self, found: Replayed, transitions: Transitions, steps: Steps, rows: slice
     ) -> Array:
         """Returns the states and the reading at zeroing (len(rows), 18)."""
-        states = transitions.of_encoders(found.states, steps, rows)
+        own, went = self._transitions, steps.select(rows)
+        states = found.states
+        if self.reading.station in ("cell", "hardware"):
+            load = 0.5 * (went.wrench + states[:, 6:])
+            moves = self._posture.moves(went, own.before[rows], load)
+            states = transitions.of_encoders(states, steps, rows, moves)
         states = at_sensor(states, self.reading.mounting)
-        states[:, 6:] += self._transitions.sway[rows]
+        states[:, :6] += own.rate_change[rows] @ self._response.lag
+        states[:, 6:] += own.sway[rows]
         zero = self.reading.zeroed(found.reading_at_zeroing)
         return np.hstack([states, np.broadcast_to(zero, (len(states), 6))])
 
@@ -174,7 +185,8 @@ class TwinModel(SimulatedModel):
         effects = sensor_chain(scenario.effects)
         states, zero = simulated[:, :12], simulated[0, 12:]
         if effects:
-            states = self.reading.read(effects, states, zero, self._times[rows])
+            times, between = self._times[rows], self._between(theta, rows)
+            states = self.reading.read(effects, states, zero, times, between)
         steps, late = self._executed_at(scenario)
         if late is None:
             return states
@@ -190,6 +202,19 @@ class TwinModel(SimulatedModel):
         sensing = self.reading.sensing(states, self._times)
         inputs: Array = SensorResidualModel.inputs_of(raw, sensing)
         return dict.fromkeys(WRENCH, inputs)
+
+    def _between(self, theta: Array, rows: slice) -> Array | None:
+        """Returns what moving loads the sensor with on the way through each step.
+
+        See `sensed_along`; None where nobody remembers it.
+        """
+        if not _with_memory(self.scenario_at(theta)):
+            return None
+        change, times = self._transitions.rate_change[rows], self._times[rows]
+        follows = np.diff(times, prepend=0.0) < 1.5 * self._transitions.period
+        swing = self._response.swing
+        found: Array = np.einsum("na,abj->nbj", change * follows[:, None], swing)
+        return found
 
     @property
     def _times(self) -> Array:
@@ -334,7 +359,10 @@ class TwinModel(SimulatedModel):
             return whole
         rows = self._transitions.rows
         ends = rows[whole.steps.index[rows] > 0]
-        known = model._begun_where_led(theta, whole, ends)
+        if _with_memory(self.scenario_at(theta)):
+            known = model._led_alone(theta, whole)
+        else:
+            known = model._begun_where_led(theta, whole, ends)
         change = self._observer.change(known.select(rows), self._transitions)
         is_new = not self._whole.seen.any()
         noticeable = is_new or np.mean(change**2, axis=0).max() > 1.0
@@ -345,17 +373,35 @@ class TwinModel(SimulatedModel):
 
         With the grip as the model has it, whatever the sensor reads.
         """
-        whole = self._whole
-        ends = np.flatnonzero(whole.steps.index > 0)
-        known = self._begun_where_led(np.zeros(0), whole, ends, is_blind=True)
+        known = self._led_alone(np.zeros(0), self._whole)
         return self.replace(_whole=known, _transitions=known)
+
+    def _led_alone(self, theta: Array, whole: Transitions) -> Transitions:
+        """Returns all transitions, each beginning where the step before it has led.
+
+        Under the load that this model has: what a sensor with a memory reads is not it.
+
+        Args:
+            theta: (p,) values of `parameters`.
+            whole: all transitions.
+        """
+        ends, states = np.flatnonzero(whole.steps.index > 0), whole.read(self.reading)
+        for _ in range(_PASSES):
+            model = self.replace(_whole=whole, _displacement=None)
+            led = model._ends(theta, ends - 1)
+            is_known = np.isfinite(led.states).all(axis=1)
+            states[ends[is_known], 6:] = led.states[is_known, 6:]
+            before, loaded = whole, whole.with_loads(states, self.reading)
+            whole = self._observer.corrected(loaded, ends, led, states)
+            if not self._observer.changed(whole, before).any():
+                break
+        return whole
 
     def _begun_where_led(
         self,
         theta: Array,
         known: Transitions,
         ends: NDArray[np.int64],
-        is_blind: bool = False,
     ) -> Transitions:
         """Returns all transitions, some of which begin where the step before has led.
 
@@ -363,18 +409,14 @@ class TwinModel(SimulatedModel):
             theta: (p,) values of `parameters`.
             known: all transitions.
             ends: (n,) numbers of those that begin so; none is an episode's first.
-            is_blind: whether the model is believed instead of the sensor.
         """
         observer, read = self._observer, known.read(self.reading)
         for _ in range(_PASSES):
             if not len(ends):
                 break
             led = self.replace(_whole=known, _displacement=None)._ends(theta, ends - 1)
-            if is_blind:
-                read[ends, 6:] = led.states[:, 6:]
             before, known = known, observer.corrected(known, ends, led, read)
-            if not is_blind:
-                ends = ends[observer.changed(known, before)[ends - 1]]
+            ends = ends[observer.changed(known, before)[ends - 1]]
         return known
 
     def _ends(self, theta: Array, rows: NDArray[np.int64]) -> Led:
@@ -549,6 +591,12 @@ def _with_displacement(steps: Steps, ends: Array, period: float) -> Steps:
     return dataclasses.replace(
         steps, qd=steps.qd + begin, qd_rate=steps.qd_rate + more / period
     )
+
+
+def _with_memory(scenario: Scenario) -> list[SensorMemoryEffect]:
+    """Returns the effects on the sensor that have one."""
+    chain = sensor_chain(scenario.effects)
+    return [each for each in chain if isinstance(each, SensorMemoryEffect)]
 
 
 def _environment_alone(scenario: Scenario) -> Scenario:

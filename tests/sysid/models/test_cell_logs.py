@@ -194,4 +194,4 @@ def test_where_a_part_comes_free_the_whole_load_may_be_lost(cell_log):
         for e in (episode, freed)
     ]
     assert np.all(errors[1][-2:, 6:9] > 8.0) and np.all(errors[1][-2:, 9:] > 2.2)
-    np.testing.assert_array_equal(errors[1][:-3], errors[0][:-3])
+    np.testing.assert_allclose(errors[1][:-3], errors[0][:-3], rtol=1e-3)
