@@ -2,7 +2,7 @@
 
 A world is a simulated cell with hydroelastic contact, and one effect in it or none; a
 runner gets its model, without the effect, and seconds of its robot. Groups of worlds:
-`pairs` (an effect that logs of removals leave ambiguous with another, 70), `null`
+`pairs` (an effect that logs of removals leave ambiguous with another, 100), `null`
 (nothing is hidden, 20), `missing` (an effect that the library lacks, 20), `parts` (all
 of these on three parts, 60).
 

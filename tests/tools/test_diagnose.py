@@ -4,6 +4,7 @@ import io
 
 import pytest
 
+from drake_disasm.scenario import load_scenario
 from tests.tools.programs import run_program
 
 _TWIN = ("--set", "contact.model=impact", "--station", "twin")
@@ -42,3 +43,6 @@ def test_the_story_is_told(tmp_path):
     assert run.returncode == 0, run.stderr
     assert "settled: the model lacks GroovePose" in run.stdout
     assert "GroovePose" in (tmp_path / "out/report.html").read_text()
+    (effect,) = load_scenario(tmp_path / "out/scenario.yaml").effects
+    (hidden,) = load_scenario("removal_turned").effects
+    assert effect.ry == pytest.approx(hidden.ry, rel=0.1)

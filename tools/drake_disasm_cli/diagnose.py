@@ -9,8 +9,9 @@ when the robot time is spent.
 
 An experiment is performed only if the twin keeps within 70 % of the task's force and
 torque, the workspace and the arm's joint limits under every hypothesis. Before each one
-a person is asked, unless --yes. The log, the fits and the story of the rounds
-(`report.html`, `diagnosis.json`) are in --out; after Ctrl-C the same command goes on.
+a person is asked, unless --yes. Log, fits, the story of the rounds (`report.html`,
+`diagnosis.json`) and the scenario with what was found (`scenario.yaml`) are in --out;
+after Ctrl-C the same command goes on.
 
 With --kind joint_motion (torques) or joint_response (positions) the arm takes the bolt
 out and moves in free space beside the bench, and the model of the arm is diagnosed.
@@ -39,7 +40,7 @@ from drake_disasm.experiments import (
     registered_experiments,
     registered_joint_experiments,
 )
-from drake_disasm.scenario import Scenario, load_scenario
+from drake_disasm.scenario import Scenario, dump_scenario, load_scenario
 from drake_disasm.stations import make_station
 from drake_disasm.task.simulation import StationFactory
 from drake_disasm.visualization import MeshcatView, start_meshcat
@@ -158,6 +159,7 @@ def main(arguments: Sequence[str]) -> int:
         found = pursue(subject, args.out, budget, confirm, workers)
     origin = program.provenance("drake-disasm diagnose", arguments, 0)
     write_text(args.out / "report.html", diagnosis_page(found, origin, args.html))
+    _write_scenario(args.out / "scenario.yaml", found)
     print(_text(found))
     print(f"report: {args.out / 'report.html'}")
     return 0 if found.is_settled else EXIT_OPEN
@@ -274,6 +276,15 @@ def _asked(question: str) -> bool:
         return input(f"{question}; perform it? [y/N] ").strip().lower() in ("y", "yes")
     except EOFError:
         raise DisasmError("nobody answers; give --yes") from None
+
+
+def _write_scenario(file: Path, found: Diagnosis) -> None:
+    """Writes the scenario with what was found; none is there if no name stands."""
+    scenario = found.closed.scenario if found.names else None
+    if scenario is None:
+        file.unlink(missing_ok=True)
+    else:
+        write_text(file, dump_scenario(scenario))
 
 
 def _text(found: Diagnosis) -> str:
