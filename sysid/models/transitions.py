@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from drake_disasm.cell.coordinates import BoltCoordinates
 from drake_disasm.cell.tool import Tool
+from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.errors import DisasmError
+from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.effects import MotionEffect, SensorEffect, SensorMemoryEffect
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
@@ -352,21 +354,26 @@ def measured_states(
         lambda _, episode: at_sensor(observations(episode)[1:], sensing.mounting),
     )
     head = scenario.part.touch_radius
-    error = np.concatenate([_model_error(log, sensing, head) for log in logs])
+    twin = twin_of(scenario)
+    S = velocity_shift(twin.p_BoTo_B)
+    yields = (S @ np.linalg.solve(twin.arm.K, S.T))[:, :3]
+    errors = [_model_error(log, sensing, head, yields) for log in logs]
+    error = np.concatenate(errors)
     return dataclasses.replace(found, model_error=error) if error.any() else found
 
 
-def _model_error(log: Log, sensing: SensorReading, head: float) -> Array:
+def _model_error(log: Log, sensing: SensorReading, head: float, yields: Array) -> Array:
     """Returns by how much the twin is off (rows, 12) in a log of an arm, 1 sigma.
 
     The force may be off to any side, and turns the sensor with the lever to the bolt,
-    on whose head it acts anywhere; where a part comes free, by the whole load. A log of
-    the twin has none.
+    on whose head it acts anywhere; where a part comes free, by the whole load. The arm
+    yields to it. A log of the twin has none.
 
     Args:
         log: of transitions.
         sensing: of the scenario.
         head: the head's radius [m].
+        yields: (6, 3) pose of the arm by a force on the bolt at Bo, in G.
     """
     changes = [np.diff(observations(e)[:, 6:9], axis=0) for e in log.episodes]
     change = np.linalg.norm(np.concatenate(changes), axis=1)
@@ -377,7 +384,8 @@ def _model_error(log: Log, sensing: SensorReading, head: float) -> Array:
     force = np.hypot(least, share * change)
     lever = np.abs(sensing.p_SoBo_S)
     across = np.sqrt(np.maximum(lever @ lever - lever**2, 0.0) + head**2)
-    found[:, :3], found[:, 3:6] = POSE_ERROR
+    of_force = force[:, None] * np.linalg.norm(yields, axis=1)
+    found[:, :6] = np.hypot(np.repeat(POSE_ERROR, 3), of_force)
     found[:, 6:9] = force[:, None]
     found[:, 9:] = force[:, None] * across
     lost = [_lost_at_the_end(episode, sensing) for episode in log.episodes]
