@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import sensor_in_motion
 
+from drake_disasm.cell.twin_parameters import twin_of
+from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.effects import SensorBias, SensorGainDrift, SensorWarmUp
 from drake_disasm.logs import Log
 from drake_disasm.policies import Exploring, make_policy
@@ -89,8 +91,11 @@ def test_the_error_grows_with_the_forces_change(cell_log):
     np.testing.assert_allclose(
         lever, np.tile([0.297, 0.297, 0.005], (_STEPS, 1)), atol=1e-3
     )
-    place = np.repeat(POSE_ERROR, 3)
-    np.testing.assert_array_equal(measured.model_error[:, :6], [place] * _STEPS)
+    twin = twin_of(_SCENARIO)
+    S = velocity_shift(twin.p_BoTo_B)
+    yields = np.linalg.norm((S @ np.linalg.inv(twin.arm.K) @ S.T)[:, :3], axis=1)
+    place = np.hypot(np.repeat(POSE_ERROR, 3), np.outer(force, yields))
+    np.testing.assert_allclose(measured.model_error[:, :6], place)
     half = measured.select(np.arange(_STEPS) % 2 == 0)
     np.testing.assert_array_equal(half.model_error, measured.model_error[::2])
 
