@@ -44,8 +44,8 @@ FORCE_ERROR = (0.02, 0.15)
 
 #: And of where the arm is [m, rad], beyond what its encoders say: its posture is taken
 #: to first order, and it follows a change of rate a little differently. By 20 um, and a
-#: hand that yields so far turns by 40 urad. It is no noise, so it counts twice. Besides,
-#: the arm yields to what the force is off by.
+#: hand that yields so far turns by 40 urad. It is no noise, so it counts twice.
+#: Besides, the arm yields to what the force is off by.
 POSE_ERROR = (2e-5, 4e-5)
 
 #: Standard deviations of an average beyond which it is an offset: by chance three times
