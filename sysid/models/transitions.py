@@ -11,7 +11,6 @@ from drake_disasm.cell.coordinates import BoltCoordinates
 from drake_disasm.cell.tool import Tool
 from drake_disasm.cell.twin_parameters import twin_of
 from drake_disasm.common.errors import DisasmError
-from drake_disasm.common.spatial import velocity_shift
 from drake_disasm.effects import MotionEffect, SensorEffect, SensorMemoryEffect
 from drake_disasm.logs import Episode, Log
 from drake_disasm.logs.refusal import refusal
@@ -356,8 +355,7 @@ def measured_states(
     )
     head = scenario.part.touch_radius
     twin = twin_of(scenario)
-    S = velocity_shift(twin.p_BoTo_B)
-    yields = (S @ np.linalg.solve(twin.arm.K, S.T))[:, :3]
+    yields = np.linalg.inv(twin.arm.at(-twin.p_BoTo_B).K)[:, :3]
     errors = [_model_error(log, sensing, head, yields) for log in logs]
     error = np.concatenate(errors)
     return dataclasses.replace(found, model_error=error) if error.any() else found
