@@ -214,7 +214,7 @@ def _settled(closed: ClosedLoop) -> str:
     names = short_names(closed.verdict.confirmed) or NOTHING
     if _leaves_more(closed):
         return (
-            f"not in the library: {names} comes nearest, and leaves more than noise "
+            f"not in the library: what comes nearest, {names}, leaves more than noise "
             "and the model's own errors"
         )
     if closed.verdict.ending == "partly":

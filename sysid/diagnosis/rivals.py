@@ -15,6 +15,7 @@ from sysid.diagnosis.growing_log import GrowingLog
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effect_class, short_names
+from sysid.effect_selection.exceeds_noise import exceeds_noise_p
 from sysid.effect_selection.forward_selection import room
 from sysid.fitting.candidates import Candidate, candidates
 from sysid.fitting.fit import Fit
@@ -30,7 +31,7 @@ NOTHING = "nothing"
 #: And where that is said of what would happen.
 AS_IT_IS = "the model as it is"
 
-#: How many experiments are made about what is unexplained, suggested, or unseen.
+#: How many experiments are made about what is unexplained, or suggested.
 TRIED = 3
 
 #: How far apart two rivals are that differ by more than chance, in standard deviations.
@@ -97,8 +98,9 @@ class Need:
     """How far apart two rivals have to be for a verdict to tell them apart.
 
     One has to leave so much more of the loss as the margin of ambiguity asks
-    (`Gain.is_about_as_good_as`), a share of what is left: each row adds to it, too. And
-    more than chance.
+    (`Gain.is_about_as_good_as`), or, where nothing is named, as an effect has to take
+    away to be. Both are shares of what is left: each row adds to it, too. And more than
+    chance.
 
     Attributes:
         margin: of the log so far.
@@ -111,9 +113,11 @@ class Need:
     @classmethod
     def of(cls, closed: ClosedLoop) -> "Need":
         """Returns what a verdict needs."""
-        left = closed.last.held_out_losses
+        left, settings = closed.last.held_out_losses, closed.last.settings
         taken = closed.first.held_out_losses - left
-        margin = closed.last.settings.ambiguity_margin * room(taken, left)
+        margin = settings.ambiguity_margin * room(taken, left)
+        if not closed.verdict.names:
+            margin = settings.min_gain / (1.0 - settings.min_gain) * float(left.sum())
         return cls(margin, margin / closed.last.model.measurements.rows)
 
     def distances(self, rivals: Sequence[Rival], rows: int) -> Array:
@@ -308,42 +312,38 @@ def unseen_rivals(
     log: GrowingLog,
     workers: Workers,
     folder: Path | None,
-    asked: Sequence[tuple[str, ...]],
 ) -> tuple[TwinRival, ...]:
     """Returns the verdict, and what its log does not speak against, each as a rival.
 
-    An effect that its fit leaves at no size is one of a size that matters, in the field
-    in which more of the log would show it soonest, unless the log speaks against that.
-    Where something is named, that is all that was asked; and after three experiments
-    about what is unseen, that nothing is.
+    An effect of which a fit is noise is one of a size that matters, in the field in
+    which more of the log would show it soonest, unless the log speaks against that.
+    Where something is named, that is all that was asked.
 
     Args:
         closed: the verdict.
         log: so far.
         workers: fit.
         folder: of a cache of fits.
-        asked: names of the verdict before each experiment.
     """
     scenario = closed.scenario
     if scenario is None:
         return ()
     named = closed.verdict.confirmed
-    if named or list(asked).count(()) >= TRIED:
-        name = " and ".join(named) or NOTHING
-        return (TwinRival(name, 1.0, 0.0, scenario),)
+    if named:
+        return (TwinRival(" and ".join(named), 1.0, 0.0, scenario),)
     model = log.model(scenario)
     fitter, library = _fitter(closed, model, workers, folder), candidates(model)
-    alone, without = fitter.fit(()).loss, _loss(model)
-    found = [TwinRival(NOTHING, 1.0, alone, scenario)]
+    base, without = fitter.fit(()), _loss(model)
+    found = [TwinRival(NOTHING, 1.0, base.loss, scenario)]
     for kind, limit in _unseen(closed.verdict.limits)[:_MOST]:
         effect = _of_size(kind, limit)
         more = dataclasses.replace(scenario, effects=[*scenario.effects, effect])
-        loss, name = alone + _loss(log.model(more)) - without, limit.effect
+        loss, name = base.loss + _loss(log.model(more)) - without, limit.effect
         rival = TwinRival(name, 1.0, loss, more)
         fit = fitter.fit(tuple(each for each in library if each.name == name)[:1])
-        if alone - fit.loss >= BY_CHANCE**2:
+        if exceeds_noise_p(base, fit, len(fit.theta)) < fitter.settings.alpha:
             rival = twin_rival(name, fit, 1.0, fit.loss) or rival
-        if rival.loss - alone < BY_CHANCE**2:
+        if rival.loss - base.loss < BY_CHANCE**2:
             found.append(rival)
     return tuple(dataclasses.replace(each, weight=1.0 / len(found)) for each in found)
 

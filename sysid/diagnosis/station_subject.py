@@ -70,7 +70,7 @@ class StationSubject(Subject):
         """See Subject."""
         model = self._log.model()
         left = open_rivals(closed, model, twin_rival, workers, fits, asked)
-        return left or unseen_rivals(closed, self._log, workers, fits, asked)
+        return left or unseen_rivals(closed, self._log, workers, fits)
 
     def predict(
         self,

@@ -299,4 +299,6 @@ def _text(found: Diagnosis) -> str:
             time = f"{each.robot_time:.0f} s"
             lines.append(f"{each.experiment}: {time}, at most {most}{ended}")
     lines.append(f"{found.reason} ({found.robot_time:.0f} s of robot time)")
+    if found.is_refuted:
+        lines.append("from the library alone:")
     return "\n".join([*lines, found.closed.text])

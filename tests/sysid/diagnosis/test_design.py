@@ -1,6 +1,8 @@
 """Which experiment is chosen, and that it is safe."""
 
 import dataclasses
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -11,6 +13,8 @@ from drake_disasm.scenario import load_scenario
 from sysid.diagnosis.design import mahalanobis, predict
 from sysid.diagnosis.in_contact import twin_forecasts
 from sysid.diagnosis.rivals import Need, TwinRival, best_of_folds
+from sysid.effect_selection.close_loop import ClosedLoop
+from sysid.fitting.settings import DEFAULT_SETTINGS
 
 NEED = Need(25.0)
 IMPACT = load_scenario("removal", ["contact.model=impact"])
@@ -36,6 +40,21 @@ def test_the_better_of_most_folds_has_the_weight() -> None:
     np.testing.assert_allclose(best_of_folds([even, even + 0.1]), [1.0, 0.0])
     one, other = best_of_folds([even, even[::-1]])
     assert one + other == 1.0 and 0.3 < one < 0.8
+
+
+def test_where_nothing_is_named_an_effect_has_to_take_away_enough_to_be() -> None:
+    """Of a log of a loss of 100, and of its rows that are added."""
+    verdict, model = SimpleNamespace(names=()), SimpleNamespace()
+    model.measurements = SimpleNamespace(rows=50)
+    last = SimpleNamespace(
+        held_out_losses=np.full(4, 25.0), settings=DEFAULT_SETTINGS, model=model
+    )
+    closed = SimpleNamespace(verdict=verdict, first=last, last=last)
+    least = DEFAULT_SETTINGS.min_gain
+    need = Need.of(cast(ClosedLoop, closed))
+    assert need.margin == pytest.approx(100.0 * least / (1.0 - least))
+    [[_, apart], _] = need.distances([rival("one"), rival("other")], 500)
+    assert apart**2 == pytest.approx(1100.0 * least / (1.0 - least))
 
 
 def test_a_drift_and_a_settling_reading_are_told_apart_by_waiting() -> None:
