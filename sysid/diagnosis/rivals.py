@@ -172,7 +172,7 @@ def open_rivals(
     if len(sets) < 2:
         return ()
     fits = [fitter.fit(s.effects, _start(closed.last, s.effects)) for s in sets]
-    shares = best_of_folds([fit.held_out_losses for fit in fits])
+    shares = best_of_folds([fit.held_out_losses.sum(axis=1) for fit in fits])
     equal = 1.0 / max(1, sum(each.is_equal for each in sets))
     found = []
     for each, name, fit, share in zip(

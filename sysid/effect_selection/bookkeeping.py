@@ -52,7 +52,7 @@ def _gain(before: Fit, after: Fit) -> float:
     Zero, if more than one part of the log asks for the other: a log is written in one
     way from end to end.
     """
-    left, lost = after.held_out_losses, before.held_out_losses
+    left, lost = (fit.held_out_losses.sum(axis=1) for fit in (after, before))
     if not is_replicated(left, lost):
         return 0.0
     return float(1.0 - left.sum() / max(lost.sum(), 1e-300))

@@ -69,28 +69,30 @@ class Gain:
     Attributes:
         term: with the columns that can help.
         of_blocks: (F,) of each fold's loss, in units of the loss of all.
-        left: (F,) of each fold's loss, in the same units.
+        room: see `room`, in the same units.
     """
 
     term: Term
     of_blocks: Array
-    left: Array
+    room: float
 
     @classmethod
     def of(cls, term: Term, before: Array, after: Array) -> "Gain":
-        """Returns the gain of a term by the losses (F,) of folds before and with it."""
+        """Returns the gain of a term by losses before and with it.
+
+        Args:
+            term: that is added.
+            before, after: (F,) of folds, or (F, C) of folds and channels.
+        """
         whole = max(float(before.sum()), 1e-300)
-        return cls(term, (before - after) / whole, after / whole)
+        taken, left = (before - after) / whole, after / whole
+        of_blocks = taken.reshape(len(taken), -1).sum(axis=1)
+        return cls(term, of_blocks, room(taken, left))
 
     @property
     def share(self) -> float:
         """Of the loss."""
         return float(self.of_blocks.sum())
-
-    @property
-    def room(self) -> float:
-        """See `room`."""
-        return room(self.of_blocks, self.left)
 
     @property
     def text(self) -> str:
@@ -122,11 +124,12 @@ class Gain:
 def room(taken: Array, left: Array) -> float:
     """Returns what is taken away of a loss or what is left, whichever is less.
 
-    Fold by fold: what no effect explains in one says nothing of what explains another.
+    Fold by fold, and channel by channel where those are known: what no effect explains
+    in one says nothing of what explains another.
 
     Args:
-        taken: (F,) of each fold's loss.
-        left: (F,) of it.
+        taken: (F,) of each fold's loss, or (F, C) of each channel's in it.
+        left: of it.
     """
     return float(np.minimum(taken, left).clip(0.0).sum())
 

@@ -249,6 +249,11 @@ class NormalEquations:
         x = self._of_others(own)
         return np.asarray(np.einsum("bi,bij,bj->b", x, own, x))
 
+    def fitted_to_others(self, columns: Columns) -> Array:
+        """Returns the coefficients (B, k) of columns, fitted to all other blocks."""
+        kept = np.append(columns, -1)
+        return self._of_others(self.blocks[:, kept][:, :, kept])[:, :-1]
+
     def held_out_gain(self, columns: Columns) -> float:
         """Returns the share of the loss that columns take away, see `held_out`."""
         total = max(float(self.losses.sum()), 1e-300)
@@ -277,8 +282,7 @@ class NormalEquations:
         as long as a block is longer than that lasts, and for coefficients that take up
         noise; Student's t has `degrees_of_freedom`.
         """
-        kept = np.append(columns, -1)
-        x = self._of_others(self.blocks[:, kept][:, :, kept])[:, :-1]
+        x = self.fitted_to_others(columns)
         away = x - x.mean(axis=0)
         return np.asarray((1.0 - 1.0 / len(x)) * away.T @ away)
 

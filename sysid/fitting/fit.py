@@ -13,6 +13,7 @@ from sysid.fitting.block_grams import (
     BlockGrams,
     NormalEquations,
     blocks_of,
+    fold_numbers,
 )
 from sysid.fitting.candidates import Candidate
 from sysid.fitting.settings import SelectionSettings
@@ -160,14 +161,19 @@ class Fit:
         folds = self.equations.folds(self.settings.folds)
         return float(t_distribution.ppf(0.975, folds.degrees_of_freedom))
 
-    @property
+    @functools.cached_property
     def held_out_losses(self) -> Array:
-        """Loss of each fold (F,) with all parameters fitted to the others.
+        """Loss of each fold and channel (F, C), all parameters fitted to other folds.
 
         But those that a bound holds: past it the model does not go.
         """
-        numbers = np.flatnonzero(~self.is_at_bound)
-        return self.equations.folds(self.settings.folds).held_out(numbers)
+        numbers, linear = np.flatnonzero(~self.is_at_bound), self.linearisation
+        changes = self.equations.folds(self.settings.folds).fitted_to_others(numbers)
+        fold = fold_numbers(len(self.equations.rows), self.settings.folds)[self.blocks]
+        columns = linear.jacobian[:, :, numbers]
+        left = linear.residual + np.einsum("rck,rk->rc", columns, changes[fold])
+        squares = linear.weights * left**2
+        return np.array([squares[fold == f].sum(axis=0) for f in range(len(changes))])
 
     @property
     def values(self) -> dict[str, float]:

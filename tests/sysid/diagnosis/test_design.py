@@ -47,7 +47,7 @@ def test_where_nothing_is_named_an_effect_has_to_take_away_enough_to_be() -> Non
     verdict, model = SimpleNamespace(names=()), SimpleNamespace()
     model.measurements = SimpleNamespace(rows=50)
     last = SimpleNamespace(
-        held_out_losses=np.full(4, 25.0), settings=DEFAULT_SETTINGS, model=model
+        held_out_losses=np.full((4, 1), 25.0), settings=DEFAULT_SETTINGS, model=model
     )
     closed = SimpleNamespace(verdict=verdict, first=last, last=last)
     least = DEFAULT_SETTINGS.min_gain

@@ -26,7 +26,7 @@ class Fits:
         left = 100.0 - sum(_TAKEN[name] for name in names)
         return SimpleNamespace(
             effects=effects,
-            held_out_losses=np.full(8, left / 8.0),
+            held_out_losses=np.full((8, 1), left / 8.0),
             linearisation=SimpleNamespace(u=np.ones(6)),
             null=np.zeros(6),
             half_intervals=np.zeros(6),
