@@ -1,5 +1,6 @@
 """What a log could have shown: the smallest effects that would have been found."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -40,8 +41,8 @@ class DetectionLimit:
 def detection_limits(account: LinearAccount) -> list[DetectionLimit]:
     """Returns the limit of each amplitude of each effect, shape by shape.
 
-    An effect is found if it takes away `min_gain` of the loss, and if its coefficient
-    is significant beside the model's own.
+    An effect is found if it takes away `min_gain` of the loss, if its coefficient is
+    significant beside the model's own, and if the model's own error can't be all of it.
     """
     errors = account.whole.folds(account.settings.folds).errors_beside(account.columns)
     shown = [
@@ -85,23 +86,16 @@ def _limits(account: LinearAccount, term: Term, errors: Array) -> list[Detection
         errors: standard error of each column of the account.
     """
     (candidate,) = term.candidates
-    equations, settings = account.equations, account.settings
+    equations = account.equations
     parameters = [account.system.parameters[column] for column in term.columns]
     scaling, nominal = Scaling(tuple(parameters)), nominal_values(tuple(parameters))
     at, slope = scaling.to_unit(nominal), scaling.slope(nominal)
     shape = ", ".join(f"{k}={v:g}" for k, v in candidate.shape.items())
-    above = float(norm.ppf(settings.detection_power))
-    needed = above + t_distribution.isf(0.5 * settings.alpha, settings.folds - 1)
-    loss = float(equations.losses.sum())
     found = []
     for i, column in enumerate(term.columns):
         if not equations.is_new(np.array([column]))[0]:
             continue  # the model's own parameters, or its effects, can do the same
-        power = float(equations.total[column, column])
-        least = np.inf
-        if power > 0.0:
-            of_use = np.sqrt(settings.min_gain / (1 - settings.min_gain) * loss / power)
-            least = max(needed * errors[column], of_use + above * errors[column])
+        least = _least(account, column, float(errors[column]))
         share = float(least / max(at[i], 1.0 - at[i]))
         amplitude = float(least * slope[i]) if share <= 1.0 else None
         field = field_of(account.system.parameters[column])
@@ -110,3 +104,18 @@ def _limits(account: LinearAccount, term: Term, errors: Array) -> list[Detection
             DetectionLimit(candidate.name, field, amplitude, unit, share, shape)
         )
     return found
+
+
+def _least(account: LinearAccount, column: int, error: float) -> float:
+    """Returns the least coefficient of a column, in the unit box, that is found."""
+    equations, settings = account.equations, account.settings
+    power, loss = float(equations.total[column, column]), float(equations.losses.sum())
+    if power <= 0.0:
+        return math.inf
+    above = float(norm.ppf(settings.detection_power))
+    beside = float(t_distribution.isf(0.5 * settings.alpha, settings.folds - 1))
+    of_use = math.sqrt(settings.min_gain / (1.0 - settings.min_gain) * loss / power)
+    least = max((above + beside) * error, of_use + above * error)
+    names = {name for term in account.system.terms for name in term.names}
+    alpha = settings.alpha / len(names)
+    return max(least, account.system.least_beyond_noise(column, alpha, above))

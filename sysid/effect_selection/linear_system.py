@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from sysid.effect_selection.forward_selection import Term, channel_weights
 from sysid.fitting.block_grams import (
@@ -45,6 +46,8 @@ class LinearSystem:
         untested: candidates, as text, for which the time was not enough.
         settings: thresholds.
         unseen: candidates that no row depends on, in whatever shape.
+        model_error_share: (rows, channels) of what is stated, the model's own error;
+            None where nothing is stated.
     """
 
     grams: BlockGrams
@@ -57,6 +60,7 @@ class LinearSystem:
     untested: tuple[str, ...]
     settings: SelectionSettings
     unseen: tuple[Candidate, ...] = ()
+    model_error_share: Array | None = None
 
     @property
     def weights(self) -> Array | None:
@@ -86,6 +90,29 @@ class LinearSystem:
             name = f"{term.candidates[number].name}.{field}"
             found[name] = self.linearisation.jacobian[..., column]
         return found
+
+    def least_beyond_noise(self, column: int, alpha: float, above: float) -> float:
+        """Returns how far along a column noise and the model's own error may lead.
+
+        The latter were it in each row as large as stated, and of the sign that the
+        column has; in all channels, or in the one that shows it best: see
+        `exceeds_noise_p`.
+
+        Args:
+            column: of a candidate.
+            alpha: how often noise may be taken for more.
+            above: standard deviations beyond what it may lead to.
+        """
+        if self.model_error_share is None or self.linearisation is None:
+            return 0.0
+        along = np.abs(self.linearisation.jacobian[..., column])
+        reach = self.settings.model_error_reach
+        off = reach * np.sum(along * self.model_error_share, axis=0)
+        power = np.sum(along**2, axis=0)
+        shown = power > 0.0
+        off, power = (np.append(x.sum(), x[shown]) for x in (off, power))
+        deviations = norm.isf(0.5 * alpha / len(power)) + above
+        return float(np.min(off / power + deviations / np.sqrt(power)))
 
     def candidates_of(self, term: Term) -> list[Candidate]:
         """Returns a term's effects with those amplitudes that it has columns of."""
@@ -134,6 +161,7 @@ def linear_system(
         tuple(candidate.text for candidate in rest[len(tested) :]),
         fitter.settings,
         tuple(_unseen(tested, groups, own_columns)),
+        measured.model_error_share if fit.noise_is_stated else None,
     )
 
 

@@ -17,7 +17,14 @@ import numpy as np
 from drake_disasm.common.progress import Progress, ProgressUpdate, ignore_progress
 from drake_disasm.effects import EnvironmentEffect
 from sysid.effect_selection.exceeds_noise import exceeds_noise_p
-from sysid.effect_selection.forward_selection import Gain, Step, Term, ranked, step_of
+from sysid.effect_selection.forward_selection import (
+    Gain,
+    Step,
+    Term,
+    ranked,
+    step_of,
+    thinned,
+)
 from sysid.effect_selection.linear_account import LinearAccount
 from sysid.effect_selection.linear_system import LinearSystem, linear_system
 from sysid.effect_selection.prescreen import prescreening_fits
@@ -138,11 +145,14 @@ class RefitSelection:
     def _best_shapes(self, system: LinearSystem) -> list[Gain]:
         """Returns each effect in the shape that gains most by the linear account.
 
-        Those that gain nothing by it come last. One that would have to be larger than
+        With as few amplitudes as gain most: many take up noise of few rows. Those that
+        gain nothing by it come last. One that would have to be larger than
         it may be is none of them: a fit stops at the bound, where a share is all.
         """
-        equations = system.equations().bounded_at_null()
+        equations = system.equations().bounded_at_null().folds(self._settings.folds)
         gains = ranked(equations, system.terms, self._settings)
+        few = [thinned(equations, gain, self._settings) for gain in gains]
+        gains = sorted([*gains, *few], key=lambda gain: -gain.share)
         one = np.ones(1)
         nothing = [Gain.of(term, one, one) for term in system.terms]
         best: dict[_Names, Gain] = {}
