@@ -21,7 +21,6 @@ from sysid.fitting.candidates import Candidate, candidates
 from sysid.fitting.fit import Fit
 from sysid.fitting.fitter import Fitter
 from sysid.models.base import Array, LogModel
-from sysid.objective import pseudo_residual
 from sysid.parameters import Scaling
 from sysid.workers import Workers
 
@@ -316,7 +315,8 @@ def unseen_rivals(
     """Returns the verdict, and what its log does not speak against, each as a rival.
 
     An effect of which a fit is noise is one of a size that matters, in the field in
-    which more of the log would show it soonest, unless the log speaks against that.
+    which more of the log would show it soonest, unless the log speaks against that by
+    more than noise and the model's own error.
     Where something is named, that is all that was asked.
 
     Args:
@@ -333,25 +333,55 @@ def unseen_rivals(
         return (TwinRival(" and ".join(named), 1.0, 0.0, scenario),)
     model = log.model(scenario)
     fitter, library = _fitter(closed, model, workers, folder), candidates(model)
-    base, without = fitter.fit(()), _loss(model)
+    base = fitter.fit(())
     found = [TwinRival(NOTHING, 1.0, base.loss, scenario)]
-    for kind, limit in _unseen(closed.verdict.limits)[:_MOST]:
-        effect = _of_size(kind, limit)
-        more = dataclasses.replace(scenario, effects=[*scenario.effects, effect])
-        loss, name = base.loss + _loss(log.model(more)) - without, limit.effect
-        rival = TwinRival(name, 1.0, loss, more)
-        fit = fitter.fit(tuple(each for each in library if each.name == name)[:1])
-        if exceeds_noise_p(base, fit, len(fit.theta)) < fitter.settings.alpha:
-            rival = twin_rival(name, fit, 1.0, fit.loss) or rival
-        if rival.loss - base.loss < BY_CHANCE**2:
+    for kind, limit in _unseen(closed.verdict.limits):
+        own = next(each for each in library if each.name == limit.effect)
+        fit = fitter.fit((own,))
+        rival: Rival | None = None
+        if _exceeds_noise(base, fit, len(fit.theta)):
+            rival = twin_rival(own.name, fit, 1.0, fit.loss)
+        else:
+            sizes = _of_size(kind, limit)
+            rival = _likeliest(own.name, sizes, log, scenario, fitter, base)
+        if rival is not None:
             found.append(rival)
+        if len(found) > _MOST:
+            break
     return tuple(dataclasses.replace(each, weight=1.0 / len(found)) for each in found)
 
 
-def _loss(model: LogModel) -> float:
-    """Returns the loss that a model without parameters leaves."""
-    error = model.measurements.weighted(model.predictions(np.zeros(0)))
-    return float(np.sum(pseudo_residual(error, model.default_huber_delta) ** 2))
+def _likeliest(
+    name: str,
+    effects: Sequence[Effect],
+    log: GrowingLog,
+    scenario: Scenario,
+    fitter: Fitter,
+    base: Fit,
+) -> TwinRival | None:
+    """Returns the hypothesis of one of some effects; None if the log refutes all.
+
+    Args:
+        name: of the hypothesis.
+        effects: of which one may be there.
+        log: that may speak against them.
+        scenario: without them.
+        fitter: of the log.
+        base: fit without them.
+    """
+    found = []
+    for effect in effects:
+        more = dataclasses.replace(scenario, effects=[*scenario.effects, effect])
+        fit = fitter.with_base(log.model(more)).fit(())
+        if not _exceeds_noise(fit, base, 1):
+            found.append(TwinRival(name, 1.0, fit.loss, more))
+    return min(found, key=lambda rival: rival.loss, default=None)
+
+
+def _exceeds_noise(before: Fit, after: Fit, parameters: int) -> bool:
+    """Returns whether one fit is better than another by more than noise."""
+    p = exceeds_noise_p(before, after, parameters)
+    return p < before.settings.alpha
 
 
 def _unseen(
@@ -371,15 +401,17 @@ def _unseen(
     return list(found.values())
 
 
-def _of_size(kind: type[Effect], limit: DetectionLimit) -> Effect:
+def _of_size(kind: type[Effect], limit: DetectionLimit) -> list[Effect]:
     """Returns an effect that a log could not have shown, of a size that matters.
 
     In the field and shape of its limit: half of its bound, or twice of what would have
-    been found.
+    been found; of both signs, if it may have either.
     """
     field = next(f for f in dataclasses.fields(kind) if f.name == limit.field)
     size = _OF_BOUND * field.metadata["high"]
     if limit.amplitude is not None:
-        size = math.copysign(min(_TIMES * abs(limit.amplitude), size), size)
+        size = min(_TIMES * abs(limit.amplitude), size)
+    signs = (1.0, -1.0) if field.metadata["low"] < 0.0 else (1.0,)
     pairs = (part.split("=") for part in limit.shape.split(", ") if part)
-    return kind(**{limit.field: size}, **{name: float(v) for name, v in pairs})
+    shape = {name: float(value) for name, value in pairs}
+    return [kind(**{limit.field: sign * size}, **shape) for sign in signs]
