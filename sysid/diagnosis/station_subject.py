@@ -16,9 +16,9 @@ from sysid.diagnosis.rivals import (
     Rival,
     open_rivals,
     twin_rival,
-    unseen_rivals,
 )
 from sysid.diagnosis.subject import Subject
+from sysid.diagnosis.unseen import unseen_rivals
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.workers import Workers
 

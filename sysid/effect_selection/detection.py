@@ -113,9 +113,9 @@ def _least(account: LinearAccount, column: int, error: float) -> float:
     if power <= 0.0:
         return math.inf
     above = float(norm.ppf(settings.detection_power))
-    beside = float(t_distribution.isf(0.5 * settings.alpha, settings.folds - 1))
+    t_value = float(t_distribution.isf(0.5 * settings.alpha, settings.folds - 1))
     of_use = math.sqrt(settings.min_gain / (1.0 - settings.min_gain) * loss / power)
-    least = max((above + beside) * error, of_use + above * error)
+    least = max((above + t_value) * error, of_use + above * error)
     names = {name for term in account.system.terms for name in term.names}
     alpha = settings.alpha / len(names)
     return max(least, account.system.least_beyond_noise(column, alpha, above))

@@ -174,6 +174,23 @@ def test_of_fits_that_all_lose_the_one_that_loses_least_is_the_step():
     assert step_of(losing, DEFAULT_SETTINGS).chosen is losing[0]
 
 
+def test_channels_in_which_nothing_is_explained_do_not_make_rivals() -> None:
+    """What is left in the second channel says nothing of the first."""
+    before = np.column_stack([np.full(8, 4.0), np.full(8, 10.0)])
+    best, worse = before.copy(), before.copy()
+    best[:, 0], worse[:, 0] = 1.0, 1.2
+    term = Term(
+        (Candidate.of(JointCoulombFriction("shoulder")),), *np.zeros((2, 1), int)
+    )
+    gain, other = (Gain.of(term, before, after) for after in (best, worse))
+    assert gain.room == pytest.approx(8.0 / before.sum())
+    assert not other.is_ambiguous_with(gain, DEFAULT_SETTINGS)
+    gain, other = (
+        Gain.of(term, before.sum(axis=1), after.sum(axis=1)) for after in (best, worse)
+    )
+    assert other.is_about_as_good_as(gain, DEFAULT_SETTINGS)
+
+
 def test_folds_in_which_nothing_is_explained_do_not_make_rivals() -> None:
     """Half of the folds stay as they are: what the model gets wrong there."""
     before = np.array([4.0, 4.0, 4.0, 4.0, 1.0, 1.0, 1.0, 1.0])

@@ -41,6 +41,17 @@ def test_an_effect_is_worth_what_the_loss_rises_by_without_it(gain):
     assert fit.theta[x] == pytest.approx(0.03, rel=0.02)
 
 
+def test_losses_of_channels_add_up_to_those_of_folds(gain):
+    fitter, effect = gain
+    fit = fitter.fit((effect,))
+    free = np.flatnonzero(~fit.is_at_bound)
+    folds = fit.equations.folds(fit.settings.folds)
+    assert fit.held_out_losses.shape == (len(folds.rows), 12)
+    np.testing.assert_allclose(
+        fit.held_out_losses.sum(axis=1), folds.held_out(free), rtol=1e-9
+    )
+
+
 def test_amplitudes_at_null_and_at_a_bound_are_none(gain):
     fitter, effect = gain
     fit = fitter.fit((effect.only(["x", "z"]),))

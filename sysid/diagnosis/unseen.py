@@ -1,0 +1,133 @@
+"""What a log could not have shown: hypotheses about it, where nothing is named."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+from drake_disasm.effects import Effect
+from drake_disasm.scenario import Scenario
+from sysid.diagnosis.growing_log import GrowingLog
+from sysid.diagnosis.rivals import NOTHING, TwinRival, fitter_of, twin_rival
+from sysid.effect_selection.close_loop import ClosedLoop
+from sysid.effect_selection.detection import DetectionLimit
+from sysid.effect_selection.effect_names import effect_class
+from sysid.effect_selection.exceeds_noise import exceeds_noise_p
+from sysid.fitting.candidates import candidates
+from sysid.fitting.fit import Fit
+from sysid.fitting.fitter import Fitter
+from sysid.workers import Workers
+
+_OF_BOUND = 0.5  # of an amplitude that no size within its bounds would have shown
+_TIMES = 2.0  # the size that would have been found
+_MOST = 6  # hypotheses at a time
+
+
+def unseen_rivals(
+    closed: ClosedLoop,
+    log: GrowingLog,
+    workers: Workers,
+    folder: Path | None,
+) -> tuple[TwinRival, ...]:
+    """Returns the verdict, and what its log does not speak against, each as a rival.
+
+    An effect of which a fit is noise is one of a size that matters, in the field in
+    which more of the log would show it soonest, unless the log speaks against that by
+    more than noise and the model's own error.
+    Where something is named, that is all that was asked.
+
+    Args:
+        closed: the verdict.
+        log: so far.
+        workers: fit.
+        folder: of a cache of fits.
+    """
+    scenario = closed.scenario
+    if scenario is None:
+        return ()
+    named = closed.verdict.confirmed
+    if named:
+        return (TwinRival(" and ".join(named), 1.0, 0.0, scenario),)
+    model = log.model(scenario)
+    fitter, library = fitter_of(closed, model, workers, folder), candidates(model)
+    base = fitter.fit(())
+    found = [TwinRival(NOTHING, 1.0, base.loss, scenario)]
+    for kind, limit in _unseen(closed.verdict.limits):
+        own = next(each for each in library if each.name == limit.effect)
+        fit = fitter.fit((own,))
+        if _exceeds_noise(base, fit, len(fit.theta)):
+            rival = twin_rival(own.name, fit, 1.0, fit.loss)
+        else:
+            more = [_with(scenario, effect) for effect in _of_size(kind, limit)]
+            rival = _likeliest(own.name, more, log, fitter, base)
+        if rival is not None:
+            found.append(rival)
+        if len(found) > _MOST:
+            break
+    return tuple(dataclasses.replace(each, weight=1.0 / len(found)) for each in found)
+
+
+def _with(scenario: Scenario, effect: Effect) -> Scenario:
+    return dataclasses.replace(scenario, effects=[*scenario.effects, effect])
+
+
+def _likeliest(
+    name: str,
+    scenarios: Sequence[Scenario],
+    log: GrowingLog,
+    fitter: Fitter,
+    base: Fit,
+) -> TwinRival | None:
+    """Returns the hypothesis of one of some scenarios; None if the log refutes all.
+
+    Args:
+        name: of the hypothesis.
+        scenarios: with an effect each.
+        log: that may speak against them.
+        fitter: of the log.
+        base: fit without an effect.
+    """
+    found = []
+    for scenario in scenarios:
+        fit = fitter.with_base(log.model(scenario)).fit(())
+        if not _exceeds_noise(fit, base, 1):
+            found.append(TwinRival(name, 1.0, fit.loss, scenario))
+    return min(found, key=lambda rival: rival.loss, default=None)
+
+
+def _exceeds_noise(before: Fit, after: Fit, parameters: int) -> bool:
+    """Returns whether one fit is better than another by more than noise."""
+    p = exceeds_noise_p(before, after, parameters)
+    return p < before.settings.alpha
+
+
+def _unseen(
+    limits: Sequence[DetectionLimit],
+) -> list[tuple[type[Effect], DetectionLimit]]:
+    """Returns effects that a log would not show at half of a field's bound.
+
+    Each in the field, and the shape, in which it would soonest; and the soonest first.
+    """
+    found: dict[str, tuple[type[Effect], DetectionLimit]] = {}
+    for limit in sorted(limits, key=lambda each: each.share):
+        made = effect_class(limit.effect)
+        if made is None or limit.share < _OF_BOUND or limit.effect in found:
+            continue
+        if limit.field in {field.name for field in dataclasses.fields(made)}:
+            found[limit.effect] = made, limit
+    return list(found.values())
+
+
+def _of_size(kind: type[Effect], limit: DetectionLimit) -> list[Effect]:
+    """Returns an effect that a log could not have shown, of a size that matters.
+
+    In the field and shape of its limit: half of its bound, or twice of what would have
+    been found; of both signs, if it may have either.
+    """
+    field = next(f for f in dataclasses.fields(kind) if f.name == limit.field)
+    size = _OF_BOUND * field.metadata["high"]
+    if limit.amplitude is not None:
+        size = min(_TIMES * abs(limit.amplitude), size)
+    signs = (1.0, -1.0) if field.metadata["low"] < 0.0 else (1.0,)
+    pairs = (part.split("=") for part in limit.shape.split(", ") if part)
+    shape = {name: float(value) for name, value in pairs}
+    return [kind(**{limit.field: sign * size}, **shape) for sign in signs]
