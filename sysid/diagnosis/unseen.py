@@ -7,12 +7,11 @@ from pathlib import Path
 from drake_disasm.effects import Effect
 from drake_disasm.scenario import Scenario
 from sysid.diagnosis.growing_log import GrowingLog
-from sysid.diagnosis.rivals import NOTHING, TwinRival, fitter_of, twin_rival
+from sysid.diagnosis.rivals import NOTHING, TwinRival, fitter_of
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.detection import DetectionLimit
 from sysid.effect_selection.effect_names import effect_class
 from sysid.effect_selection.exceeds_noise import exceeds_noise_p
-from sysid.fitting.candidates import candidates
 from sysid.fitting.fit import Fit
 from sysid.fitting.fitter import Fitter
 from sysid.workers import Workers
@@ -30,10 +29,9 @@ def unseen_rivals(
 ) -> tuple[TwinRival, ...]:
     """Returns the verdict, and what its log does not speak against, each as a rival.
 
-    An effect of which a fit is noise is one of a size that matters, in the field in
-    which more of the log would show it soonest, unless the log speaks against that by
-    more than noise and the model's own error.
-    Where something is named, that is all that was asked.
+    An effect is one of a size that matters, in the field in which more of the log would
+    show it soonest, unless the log speaks against that by more than noise and the
+    model's own error. Where something is named, that is all that was asked.
 
     Args:
         closed: the verdict.
@@ -47,18 +45,12 @@ def unseen_rivals(
     named = closed.verdict.confirmed
     if named:
         return (TwinRival(" and ".join(named), 1.0, 0.0, scenario),)
-    model = log.model(scenario)
-    fitter, library = fitter_of(closed, model, workers, folder), candidates(model)
+    fitter = fitter_of(closed, log.model(scenario), workers, folder)
     base = fitter.fit(())
     found = [TwinRival(NOTHING, 1.0, base.loss, scenario)]
     for kind, limit in _unseen(closed.verdict.limits):
-        own = next(each for each in library if each.name == limit.effect)
-        fit = fitter.fit((own,))
-        if _exceeds_noise(base, fit, len(fit.theta)):
-            rival = twin_rival(own.name, fit, 1.0, fit.loss)
-        else:
-            more = [_with(scenario, effect) for effect in _of_size(kind, limit)]
-            rival = _likeliest(own.name, more, log, fitter, base)
+        more = [_with(scenario, effect) for effect in _of_size(kind, limit)]
+        rival = _likeliest(limit.effect, more, log, fitter, base)
         if rival is not None:
             found.append(rival)
         if len(found) > _MOST:
@@ -89,15 +81,9 @@ def _likeliest(
     found = []
     for scenario in scenarios:
         fit = fitter.with_base(log.model(scenario)).fit(())
-        if not _exceeds_noise(fit, base, 1):
+        if exceeds_noise_p(fit, base, 1) >= fitter.settings.alpha:
             found.append(TwinRival(name, 1.0, fit.loss, scenario))
     return min(found, key=lambda rival: rival.loss, default=None)
-
-
-def _exceeds_noise(before: Fit, after: Fit, parameters: int) -> bool:
-    """Returns whether one fit is better than another by more than noise."""
-    p = exceeds_noise_p(before, after, parameters)
-    return p < before.settings.alpha
 
 
 def _unseen(
