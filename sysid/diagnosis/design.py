@@ -47,13 +47,14 @@ class Forecast:
         plan: of the experiment.
         duration: robot time under the rival that takes longest [s].
         greatest: force and torque under any rival [N, N m].
-        signals: of each rival its own (n,), and one for each parameter that is moved by
-            a standard deviation; in standard deviations of what is measured anyway.
+        signals: of each rival its own (n, C), and one for each parameter that is moved
+            by a standard deviation; in standard deviations of what is measured anyway.
         channel: in which rivals differ most, with its unit.
         unit: of that.
         shown: of each rival (n,) in that channel.
         period: of its rows [s].
         hazard: why it is not performed, in words; empty if it may be.
+        share: (n, C) of these standard deviations that is the model's own error.
     """
 
     plan: AnyPlan
@@ -65,6 +66,7 @@ class Forecast:
     shown: Sequence[Array]
     period: float
     hazard: str
+    share: Array | float = 0.0
 
     @property
     def rows(self) -> int:
@@ -168,8 +170,9 @@ def _predictions(
     found = []
     for each in forecasts(plans, rivals):
         name = type(each.plan.experiment).__name__
-        distances = trust.get(name, 1.0) * _distances(each.signals, weights)
-        bounds = _distances([own[:1] for own in each.signals], weights)
+        signals, own_error = each.signals, need.reach * np.asarray(each.share)
+        distances = trust.get(name, 1.0) * _distances(signals, weights, own_error)
+        bounds = _distances([own[:1] for own in signals], weights, own_error)
         needed = need.distances(rivals, each.rows)
         gain = 0.0 if each.hazard else _gain(distances / needed, weights)
         value = gain / (each.duration + _BETWEEN)
@@ -199,26 +202,45 @@ def is_enough(
     return bool((squares >= enough**2).any())
 
 
-def _distances(signals: Sequence[Sequence[Array]], weights: Array) -> Array:
+def _distances(
+    signals: Sequence[Sequence[Array]], weights: Array, own_error: Array
+) -> Array:
     """Returns how far rivals are apart (k, k).
 
     One of two is true; the other is fitted to what comes out, with the covariance
     1 + J J^T: J is how it changes with its parameters, by a standard deviation of each.
-    The mean square over which is true, by their weights.
+    The mean square over which is true, by their weights; what is beyond the model's own
+    error of it, at most.
 
     Args:
         signals: see Forecast.
         weights: (k,).
+        own_error: (n, C) of the model, in the signals' units.
     """
     found = np.zeros((len(signals), len(signals)))
     for i, j in itertools.combinations(range(len(signals)), 2):
         (one, *more), (other, *others) = signals[i], signals[j]
         away, both = one - other, weights[i] + weights[j]
-        if_one = mahalanobis(away, np.array([x - other for x in others]))
-        if_other = mahalanobis(away, np.array([x - one for x in more]))
+        flat = away.ravel()
+        if_one = mahalanobis(flat, np.array([(x - other).ravel() for x in others]))
+        if_other = mahalanobis(flat, np.array([(x - one).ravel() for x in more]))
         squared = weights[i] * if_one**2 + weights[j] * if_other**2
-        found[i, j] = found[j, i] = np.sqrt(squared / both)
+        distance = min(np.sqrt(squared / both), _beyond(away, own_error))
+        found[i, j] = found[j, i] = distance
     return found
+
+
+def _beyond(away: Array, own_error: Array) -> float:
+    """Returns the length of what (n, C) is beyond the model's own error.
+
+    In all channels, or in the one that shows it best: see `exceeds_noise_p`.
+    """
+    away = away.reshape(len(away), -1)
+    squares = np.sum(away**2, axis=0)
+    off = np.sum(np.abs(away) * own_error, axis=0)
+    squares, off = (np.append(x, x.sum()) for x in (squares, off))
+    length = np.sqrt(squares)
+    return float(np.max(length - off / np.maximum(length, 1e-300), initial=0.0))
 
 
 def mahalanobis(away: Array, columns: Array) -> float:

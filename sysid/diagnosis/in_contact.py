@@ -28,7 +28,7 @@ from drake_disasm.twin.steps import noise_free
 from sysid.diagnosis.design import Forecast
 from sysid.diagnosis.rivals import AS_IT_IS, TwinRival
 from sysid.models.base import Array
-from sysid.models.transitions import FORCE_ERROR, POSE_NOISE
+from sysid.models.transitions import FORCE_ERROR, POSE_ERROR, POSE_NOISE
 from sysid.models.twin import with_impact_as_stiff
 
 _MARGIN = 0.7  # of the greatest force and torque that a task allows
@@ -60,14 +60,16 @@ def twin_forecasts(
     replayed = [
         [next(repeated) for _ in (rival.scenario, *rival.varied)] for rival in rivals
     ]
-    sigma, reach = _sigma(rivals[0].scenario), _Reach(rivals[0].scenario)
+    reach = _Reach(rivals[0].scenario)
     found = []
     for number, plan in enumerate(plans):
         done = [own[number] for own in led]
         same = [[twin[number].observations for twin in own] for own in replayed]
         steps = min(len(each) for own in same for each in own)
-        signals = [[(x[:steps] / sigma).ravel() for x in own] for own in same]
         states = np.array([own[0][:steps] for own in same])
+        error = _own_error(states.mean(axis=0))
+        sigma = np.hypot(_noise(rivals[0].scenario), error)
+        signals = [[x[:steps] / sigma for x in own] for own in same]
         i = int(np.argmax(np.sum(np.ptp(states / sigma, axis=0) ** 2, axis=0)))
         duration = max(each.duration for each in done)
         forces, torques = zip(*(each.greatest for each in done), strict=True)
@@ -82,6 +84,7 @@ def twin_forecasts(
                 [own[0][:, i] for own in same],
                 plan.period,
                 _hazard(done, rivals, reach, limits),
+                error / sigma,
             )
         )
     return found
@@ -130,14 +133,22 @@ def _one_by_one(
     return found
 
 
-def _sigma(scenario: Scenario) -> Array:
-    """Returns the standard deviations (12,) of what a state would differ by anyway."""
+def _noise(scenario: Scenario) -> Array:
+    """Returns the standard deviations (12,) of what is measured of a state."""
     sensor = scenario.ft_sensor
     noise = np.hypot(sensor.noise, np.array(sensor.quantum) / np.sqrt(12.0))
-    force = np.hypot(noise[:3].max(), FORCE_ERROR[0])
-    torque = np.hypot(noise[3:].max(), _LEVER * FORCE_ERROR[0])
     m, rad = POSE_NOISE
-    return np.repeat([m, rad, force, torque], 3)
+    return np.repeat([m, rad, noise[:3].max(), noise[3:].max()], 3)
+
+
+def _own_error(states: Array) -> Array:
+    """Returns those of the model's own error (n, 12) in states (n, 12)."""
+    least, share = FORCE_ERROR
+    change = np.diff(states[:, 6:9], axis=0, prepend=states[:1, 6:9])
+    force = np.hypot(least, share * np.linalg.norm(change, axis=1))
+    pose = np.ones_like(force)[:, None] * POSE_ERROR
+    error = np.column_stack([pose, force, _LEVER * force])
+    return np.repeat(error, 3, axis=1)
 
 
 def _hazard(

@@ -97,20 +97,25 @@ class Need:
     Attributes:
         margin: of the log so far.
         of_row: of each row that is added.
+        reach: standard deviations of the model's own error that do not count, where
+            nothing is named.
     """
 
     margin: float
     of_row: float = 0.0
+    reach: float = 0.0
 
     @classmethod
     def of(cls, closed: ClosedLoop) -> "Need":
         """Returns what a verdict needs."""
         left, settings = closed.last.held_out_losses, closed.last.settings
         taken = closed.first.held_out_losses - left
-        margin = settings.ambiguity_margin * room(taken, left)
-        if not closed.verdict.names:
-            margin = settings.min_gain / (1.0 - settings.min_gain) * float(left.sum())
-        return cls(margin, margin / closed.last.model.measurements.rows)
+        rows = closed.last.model.measurements.rows
+        if closed.verdict.names:
+            margin = settings.ambiguity_margin * room(taken, left)
+            return cls(margin, margin / rows)
+        margin = settings.min_gain / (1.0 - settings.min_gain) * float(left.sum())
+        return cls(margin, margin / rows, settings.model_error_reach)
 
     def distances(self, rivals: Sequence[Rival], rows: int) -> Array:
         """Returns how far apart rivals have to be (k, k) in experiments to come.
