@@ -10,7 +10,7 @@ import pytest
 from drake_disasm.effects import GroovePose, SensorBias, SensorDrift, SensorWarmUp
 from drake_disasm.experiments import Presses, Rest, Reversals
 from drake_disasm.scenario import load_scenario
-from sysid.diagnosis.design import mahalanobis, predict
+from sysid.diagnosis.design import Forecast, mahalanobis, predict
 from sysid.diagnosis.in_contact import twin_forecasts
 from sysid.diagnosis.rivals import Need, TwinRival, best_of_folds
 from sysid.effect_selection.close_loop import ClosedLoop
@@ -33,6 +33,30 @@ def test_a_distance_counts_only_what_parameters_can_not_make_up() -> None:
     expected = np.sqrt(away @ np.linalg.solve(covariance, away))
     assert mahalanobis(away, columns) == pytest.approx(expected, rel=1e-9)
     assert mahalanobis(away, columns) == pytest.approx(4.0, abs=1e-3)
+
+
+def test_what_the_models_own_error_may_be_is_not_shown() -> None:
+    """But where it may be it in one channel, another still shows the rest."""
+    plan = Rest(10.0).plan(IMPACT)
+    away = np.column_stack([np.full(100, 0.5), np.zeros(100)])
+    both = np.column_stack([np.full(100, 0.5), np.full(100, 1.0)])
+    share = np.column_stack([np.full(100, 1.0), np.full(100, 0.2)])
+
+    def shown(signal: np.ndarray, need: Need) -> float:
+        def forecasts(plans: object, rivals: object) -> list[Forecast]:
+            signals = [[np.zeros_like(signal)], [signal]]
+            shown = [np.zeros(1)] * 2
+            made = Forecast(
+                plan, 10.0, (0.0, 0.0), signals, "fx", "N", shown, 0.1, "", share
+            )
+            return [made]
+
+        (found,) = predict([plan], [rival("one"), rival("other")], need, forecasts)
+        return found.farthest
+
+    assert shown(away, Need(25.0)) == pytest.approx(5.0)
+    assert shown(away, Need(25.0, reach=1.0)) == 0.0
+    assert shown(both, Need(25.0, reach=1.0)) == pytest.approx(10.0 - 2.0)
 
 
 def test_the_better_of_most_folds_has_the_weight() -> None:
