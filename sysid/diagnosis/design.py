@@ -21,6 +21,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from sysid.diagnosis.rivals import BY_CHANCE, Need, Rival
+from sysid.effect_selection.exceeds_noise import lengths_and_errors
 from sysid.models.base import Array
 
 _LOOKED_AT = 8  # experiments, of which the best is likely to be one
@@ -235,12 +236,8 @@ def _beyond(away: Array, own_error: Array) -> float:
 
     In all channels, or in the one that shows it best: see `exceeds_noise_p`.
     """
-    away = away.reshape(len(away), -1)
-    squares = np.sum(away**2, axis=0)
-    off = np.sum(np.abs(away) * own_error, axis=0)
-    squares, off = (np.append(x, x.sum()) for x in (squares, off))
-    length = np.sqrt(squares)
-    return float(np.max(length - off / np.maximum(length, 1e-300), initial=0.0))
+    lengths, errors = lengths_and_errors(away.reshape(len(away), -1), own_error)
+    return float(np.max(lengths - errors, initial=0.0))
 
 
 def mahalanobis(away: Array, columns: Array) -> float:

@@ -51,26 +51,18 @@ def twin_forecasts(
         progress: gets each simulation.
     """
     led = _performed(plans, [rival.scenario for rival in rivals], progress)
-    replays = [
-        Plan(plan.experiment, (Replay(one.actions),), plan.period)
-        for plan, one in zip(plans, led[0], strict=True)
-    ]
-    twins = [each for rival in rivals for each in (rival.scenario, *rival.varied)]
-    repeated = iter(_performed(replays, twins, progress))
-    replayed = [
-        [next(repeated) for _ in (rival.scenario, *rival.varied)] for rival in rivals
-    ]
-    reach = _Reach(rivals[0].scenario)
+    replayed = _replayed(plans, led[0], rivals, progress)
+    noise, reach = _noise(rivals[0].scenario), _Reach(rivals[0].scenario)
     found = []
     for number, plan in enumerate(plans):
         done = [own[number] for own in led]
         same = [[twin[number].observations for twin in own] for own in replayed]
         steps = min(len(each) for own in same for each in own)
-        states = np.array([own[0][:steps] for own in same])
-        error = _own_error(states.mean(axis=0))
-        sigma = np.hypot(_noise(rivals[0].scenario), error)
+        error = _own_error(np.mean([own[0][:steps] for own in same], axis=0))
+        sigma = np.hypot(noise, error)
         signals = [[x[:steps] / sigma for x in own] for own in same]
-        i = int(np.argmax(np.sum(np.ptp(states / sigma, axis=0) ** 2, axis=0)))
+        spread = np.ptp([own[0] for own in signals], axis=0)
+        i = int(np.argmax(np.sum(spread**2, axis=0)))
         duration = max(each.duration for each in done)
         forces, torques = zip(*(each.greatest for each in done), strict=True)
         found.append(
@@ -88,6 +80,27 @@ def twin_forecasts(
             )
         )
     return found
+
+
+def _replayed(
+    plans: Sequence[Plan],
+    performed: Sequence[Performance],
+    rivals: Sequence[TwinRival],
+    progress: Progress,
+) -> list[list[list[Performance]]]:
+    """Returns what rivals predict under the actions with which plans were performed.
+
+    Of each rival its own, and one for each parameter that is moved; of each all plans.
+    """
+    replays = [
+        Plan(plan.experiment, (Replay(one.actions),), plan.period)
+        for plan, one in zip(plans, performed, strict=True)
+    ]
+    twins = [each for rival in rivals for each in (rival.scenario, *rival.varied)]
+    repeated = iter(_performed(replays, twins, progress))
+    return [
+        [next(repeated) for _ in (rival.scenario, *rival.varied)] for rival in rivals
+    ]
 
 
 def forecasts_as_it_is(

@@ -11,12 +11,7 @@ from drake_disasm.scenario import Scenario, scenario_to_mapping
 from sysid.diagnosis.design import Prediction, predict
 from sysid.diagnosis.growing_log import GrowingLog
 from sysid.diagnosis.in_contact import forecasts_as_it_is, twin_forecasts
-from sysid.diagnosis.rivals import (
-    Need,
-    Rival,
-    open_rivals,
-    twin_rival,
-)
+from sysid.diagnosis.rivals import Need, Rival, open_rivals, twin_rival
 from sysid.diagnosis.subject import Subject
 from sysid.diagnosis.unseen import unseen_rivals
 from sysid.effect_selection.close_loop import ClosedLoop

@@ -14,6 +14,24 @@ from sysid.fitting.fit import Fit
 Array = NDArray[np.float64]
 
 
+def lengths_and_errors(change: Array, own_error: Array) -> tuple[Array, Array]:
+    """Returns the length of a change, and what of it may be the model's own error.
+
+    (1 + k,) each: in all channels, and in each of the k that change. The error is as
+    large as stated in each row, and of the sign that the change has.
+
+    Args:
+        change: (rows, channels) of residuals.
+        own_error: (rows, channels) of the model, in the same units.
+    """
+    squares = np.sum(change**2, axis=0)
+    along = np.sum(np.abs(change) * own_error, axis=0)
+    changed = squares > 0.0
+    squares, along = (np.append(x.sum(), x[changed]) for x in (squares, along))
+    lengths = np.sqrt(squares)
+    return lengths, along / np.maximum(lengths, 1e-300)
+
+
 def exceeds_noise_p(before: Fit, after: Fit, parameters: int) -> float:
     """Returns the p-value that noise alone makes a fit with more parameters so good.
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from sysid.effect_selection.exceeds_noise import lengths_and_errors
 from sysid.effect_selection.forward_selection import Term, channel_weights
 from sysid.fitting.block_grams import (
     BlockGrams,
@@ -105,14 +106,12 @@ class LinearSystem:
         """
         if self.model_error_share is None or self.linearisation is None:
             return 0.0
-        along = np.abs(self.linearisation.jacobian[..., column])
-        reach = self.settings.model_error_reach
-        off = reach * np.sum(along * self.model_error_share, axis=0)
-        power = np.sum(along**2, axis=0)
-        shown = power > 0.0
-        off, power = (np.append(x.sum(), x[shown]) for x in (off, power))
-        deviations = norm.isf(0.5 * alpha / len(power)) + above
-        return float(np.min(off / power + deviations / np.sqrt(power)))
+        lengths, errors = lengths_and_errors(
+            self.linearisation.jacobian[..., column],
+            self.settings.model_error_reach * self.model_error_share,
+        )
+        deviations = norm.isf(0.5 * alpha / len(lengths)) + above
+        return float(np.min((errors + deviations) / lengths))
 
     def candidates_of(self, term: Term) -> list[Candidate]:
         """Returns a term's effects with those amplitudes that it has columns of."""

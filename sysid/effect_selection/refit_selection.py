@@ -146,8 +146,8 @@ class RefitSelection:
         """Returns each effect in the shape that gains most by the linear account.
 
         With as few amplitudes as gain most: many take up noise of few rows. Those that
-        gain nothing by it come last. One that would have to be larger than
-        it may be is none of them: a fit stops at the bound, where a share is all.
+        gain nothing by it come last. One that would have to be larger than it may be is
+        none of them: a fit stops at the bound, where a share is all.
         """
         equations = system.equations().bounded_at_null().folds(self._settings.folds)
         gains = ranked(equations, system.terms, self._settings)

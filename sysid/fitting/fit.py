@@ -168,10 +168,11 @@ class Fit:
         But those that a bound holds: past it the model does not go.
         """
         numbers, linear = np.flatnonzero(~self.is_at_bound), self.linearisation
-        changes = self.equations.folds(self.settings.folds).fitted_to_others(numbers)
+        folds = self.equations.folds(self.settings.folds)
+        changes = np.zeros((len(folds.rows), len(linear.u)))
+        changes[:, numbers] = folds.fitted_to_others(numbers)
         fold = fold_numbers(len(self.equations.rows), self.settings.folds)[self.blocks]
-        columns = linear.jacobian[:, :, numbers]
-        left = linear.residual + np.einsum("rck,rk->rc", columns, changes[fold])
+        left = linear.residual + np.einsum("rcp,rp->rc", linear.jacobian, changes[fold])
         squares = linear.weights * left**2
         return np.array([squares[fold == f].sum(axis=0) for f in range(len(changes))])
 

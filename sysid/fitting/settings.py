@@ -63,7 +63,7 @@ class SelectionSettings:
     # Which effects can't be told apart.
     ambiguity_margin: float = _setting(
         0.1,
-        "of the gain or of what is left, the less in each fold and channel",
+        "of gain or remainder, the less in each fold and channel",
         "two effects that differ by less are about as good; the one with fewer "
         "coefficients is chosen",
         _ABLATION,
