@@ -4,7 +4,8 @@ A world is a simulated cell with hydroelastic contact, and one effect in it or n
 runner gets its model, without the effect, and seconds of its robot. Groups of worlds:
 `pairs` (an effect that logs of removals leave ambiguous with another, 100), `null`
 (nothing is hidden, 20), `missing` (an effect that the library lacks, 20), `parts` (all
-of these on three parts, 60).
+of these on three parts, 60), `held_out` (pairs again, ten of each, which no rule was
+chosen on).
 
 A runner is a function of `diagnosis/runners.py` (ours, passive, by_chance), or one of
 your own: MODULE:FUNCTION, in a module that Python finds, with the arguments and the
@@ -89,7 +90,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add(
         "--worlds",
         nargs="+",
-        type=options.positive,
+        type=options.count,
         metavar="N",
         help="the first N, those from N up to M, or these three and more "
         "(default: all of the group)",
@@ -155,10 +156,12 @@ def _numbers(group: str, worlds: Sequence[int]) -> Sequence[int]:
     """Returns the numbers of the worlds that are asked for.
 
     Raises:
-        DisasmError: the group has none of a number.
+        DisasmError: the group has none of a number, or no number is asked for.
     """
     every = range(GROUPS[group][1])
     few = range(*worlds) if 0 < len(worlds) < 3 else worlds or every
+    if not few:
+        raise DisasmError("--worlds: asks for none; give a number above 0, or two")
     if beyond := [number for number in few if number not in every]:
         raise DisasmError(
             f"--worlds: {group} has those from 0 to {every[-1]}, and no {beyond[0]}"

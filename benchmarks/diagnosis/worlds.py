@@ -31,12 +31,14 @@ PAIRS = (
 )
 _SEEDS = 1000  # of noise in each world
 _PARTS = ("removal", "iiwa_peg", "iiwa_bayonet")
-#: Of each group: first seed, and how many worlds there are.
+#: Of each group: first seed, and how many worlds there are. Those held out are of
+#: pairs, ten of each, for a last judgement: look at none while a rule is being chosen.
 GROUPS: Mapping[str, tuple[int, int]] = {
     "pairs": (100, 100),
     "null": (200, 20),
     "missing": (300, 20),
     "parts": (400, 60),
+    "held_out": (500, 70),
 }
 _NULLS, _MISSING = 9, 9  # of the worlds of all parts; the others are of pairs
 
@@ -144,7 +146,8 @@ def draw(group: str, number: int) -> World:
     seed, _ = GROUPS[group]
     random = np.random.default_rng([seed, number])
     if group != "parts":
-        return _drawn(group, number, _PARTS[0], group, number, random)
+        kind = "pairs" if group == "held_out" else group
+        return _drawn(group, number, _PARTS[0], kind, number, random)
     part = _PARTS[number % len(_PARTS)]
     if number < _NULLS:
         return _drawn(group, number, part, "null", number, random)
