@@ -32,13 +32,13 @@ PAIRS = (
 _SEEDS = 1000  # of noise in each world
 _PARTS = ("removal", "iiwa_peg", "iiwa_bayonet")
 #: Of each group: first seed, and how many worlds there are. Those held out are of
-#: pairs, ten of each, for a last judgement: look at none while a rule is being chosen.
+#: pairs, for a last judgement: look at none while a rule is being chosen.
 GROUPS: Mapping[str, tuple[int, int]] = {
     "pairs": (100, 100),
     "null": (200, 20),
     "missing": (300, 20),
     "parts": (400, 60),
-    "held_out": (500, 70),
+    "held_out": (500, 140),
 }
 _NULLS, _MISSING = 9, 9  # of the worlds of all parts; the others are of pairs
 

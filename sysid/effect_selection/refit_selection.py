@@ -145,13 +145,18 @@ class RefitSelection:
     def _best_shapes(self, system: LinearSystem) -> list[Gain]:
         """Returns each effect in the shape that gains most by the linear account.
 
-        With as few amplitudes as gain most: many take up noise of few rows. Those that
-        gain nothing by it come last. One that would have to be larger than it may be is
-        none of them: a fit stops at the bound, where a share is all.
+        With as few amplitudes as gain most: many take up noise of few rows. But what is
+        around the bolt keeps all: at null a derivative doesn't say which of them it is.
+        Those that gain nothing by it come last. One that would have to be larger than
+        it may be is none of them: a fit stops at the bound, where a share is all.
         """
         equations = system.equations().bounded_at_null().folds(self._settings.folds)
         gains = ranked(equations, system.terms, self._settings)
-        few = [thinned(equations, gain, self._settings) for gain in gains]
+        few = [
+            thinned(equations, gain, self._settings)
+            for gain in gains
+            if not _is_around(gain.term)
+        ]
         gains = sorted([*gains, *few], key=lambda gain: -gain.share)
         one = np.ones(1)
         nothing = [Gain.of(term, one, one) for term in system.terms]
@@ -177,8 +182,7 @@ class RefitSelection:
         return found + [
             gain
             for gain in best
-            if isinstance(gain.term.candidates[0].effect, EnvironmentEffect)
-            and gain.term.names not in known
+            if _is_around(gain.term) and gain.term.names not in known
         ]
 
     def _prescreened(self, fit: Fit, gains: Sequence[Gain]) -> list[Gain]:
@@ -274,6 +278,11 @@ class RefitSelection:
 
     _starts: dict[_Names, Fit] = field(default_factory=dict)
     _refuted: set[_Names] = field(default_factory=set)
+
+
+def _is_around(term: Term) -> bool:
+    """Returns whether a term is of what is around the bolt."""
+    return isinstance(term.candidates[0].effect, EnvironmentEffect)
 
 
 @dataclass(frozen=True)
