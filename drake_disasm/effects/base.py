@@ -152,6 +152,10 @@ class Reach:
     way: float = math.inf
     speed: float = math.inf
 
+    def longer(self, times: float) -> "Reach":
+        """Returns that of a log that takes so many times as long."""
+        return dataclasses.replace(self, duration=times * self.duration)
+
 
 @dataclasses.dataclass
 class Effect:

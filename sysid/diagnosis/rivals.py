@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from drake_disasm.effects import Effect, Reach
 from drake_disasm.scenario import Scenario
 from sysid.effect_selection.close_loop import ClosedLoop
 from sysid.effect_selection.effect_names import short_names
@@ -35,6 +36,7 @@ BY_CHANCE = 5.0
 _LEAST = 1e-4  # weight of a hypothesis that the log speaks against
 _DRAWS = 2000  # of folds: a weight of a half is then known to a hundredth
 _SUSPECTS = 3  # of something that is unexplained
+_AHEAD = 2.0  # times as long as the log: how slow a hypothesis may be
 
 
 @dataclasses.dataclass(frozen=True)
@@ -156,6 +158,9 @@ def open_rivals(
 ) -> tuple[Rival, ...]:
     """Returns the hypotheses that a verdict leaves open; none if it leaves none.
 
+    An experiment may last longer than the log, which bounds what a verdict names: a
+    hypothesis may be slower.
+
     Args:
         closed: the verdict.
         model: of the log on which it is.
@@ -164,6 +169,7 @@ def open_rivals(
         folder: of a cache of fits.
         asked: names of the verdict before each experiment.
     """
+    model = model.looking_ahead(_AHEAD)
     fitter, library = fitter_of(closed, model, workers, folder), candidates(model)
     sets = list(_open_sets(closed, library, asked))
     if len(sets) < 2:
@@ -277,11 +283,20 @@ def _ambiguous_sets(closed: ClosedLoop, library: Sequence[Candidate]) -> Iterato
 
 def _shaped(closed: ClosedLoop, name: str, library: Sequence[Candidate]) -> Candidate:
     """Returns an effect in the shape that gained most, all its amplitudes free."""
+    reach = closed.last.model.reach
     for gain in closed.search.begin:
         for candidate in gain.term.candidates:
             if candidate.name == name:
-                return Candidate.of(candidate.effect)
+                return Candidate.of(_slower(candidate.effect, reach))
     return next(each for each in library if each.name == name)
+
+
+def _slower(effect: Effect, reach: Reach) -> Effect:
+    """Returns an effect, if as slow as a log shows, as slow as a longer one would."""
+    most = effect.greatest_shapes(reach)
+    ahead = effect.greatest_shapes(reach.longer(_AHEAD))
+    at_most = [name for name, value in most.items() if getattr(effect, name) >= value]
+    return dataclasses.replace(effect, **{name: ahead[name] for name in at_most})
 
 
 def _suspects(closed: ClosedLoop, library: Sequence[Candidate]) -> Iterator[_Set]:

@@ -99,6 +99,7 @@ class LogModel(abc.ABC):
     _effects: tuple[Effect, ...] = ()
     _own_parameters: tuple[Parameter, ...] | None = None  # None: none was frozen
     _frozen: Mapping[str, float] = {}
+    _looks_ahead: float = 1.0  # times as long as the log
 
     @abc.abstractmethod
     def predict(self, theta: Array, rows: slice) -> Array:
@@ -144,6 +145,10 @@ class LogModel(abc.ABC):
         return Reach()
 
     @property
+    def _reach_ahead(self) -> Reach:
+        return self.reach.longer(self._looks_ahead)
+
+    @property
     def travel(self) -> Mapping[str, float]:
         """How far each joint moves, from end to end [rad or m]; empty: not known."""
         return {}
@@ -185,7 +190,7 @@ class LogModel(abc.ABC):
             for kind in library
             if issubclass(kind, self.effect_types)
             if kind.is_physical and not kind.is_random
-            for effect in at_null(kind, self.joints, self.reach)
+            for effect in at_null(kind, self.joints, self._reach_ahead)
             if is_shown(effect, travel, one_way)
         ]
 
@@ -199,10 +204,18 @@ class LogModel(abc.ABC):
             parameters: additional ones, fields of effects: their paths are
                 `effects.0.size` and the like.
         """
-        added = within_reach(parameters, effects, self.travel, self.reach)
+        added = within_reach(parameters, effects, self.travel, self._reach_ahead)
         return self.replace(
             _effects=tuple(effects), parameters=(*self.parameters, *added)
         )
+
+    def looking_ahead(self, times: float) -> Self:
+        """Returns the same model, whose effects may be as slow as a longer log shows.
+
+        Args:
+            times: as long as this.
+        """
+        return self.replace(_looks_ahead=times)
 
     # Which parameters vary.
 

@@ -33,7 +33,7 @@ class ScenarioModel(LogModel):
         self, effects: Sequence[Effect], parameters: Sequence[Parameter] = ()
     ) -> Self:
         """See LogModel."""
-        added = within_reach(parameters, effects, self.travel, self.reach)
+        added = within_reach(parameters, effects, self.travel, self._reach_ahead)
         return self.replace(
             scenario=dataclasses.replace(self.scenario, effects=list(effects)),
             parameters=(*self.parameters, *added),

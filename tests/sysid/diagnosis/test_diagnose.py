@@ -3,16 +3,19 @@
 import dataclasses
 import html
 from pathlib import Path
+from typing import cast
 
 import pytest
 
 from drake_disasm.effects import SensorBias, SensorDrift, SensorGain, SensorWarmUp
-from drake_disasm.experiments import Presses, Rest, Reversals
+from drake_disasm.experiments import Presses, Removal, Rest, Reversals
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
-from sysid.diagnosis import NOTHING, Budget, diagnose
+from sysid.diagnosis import NOTHING, Budget, GrowingLog, diagnose
 from sysid.diagnosis.loop import refuted_names
+from sysid.diagnosis.rivals import TwinRival, open_rivals, twin_rival
 from sysid.report import diagnosis_page
+from sysid.workers import Workers
 from tests.refusals import refused
 
 FEW = {
@@ -87,6 +90,20 @@ def test_nothing_is_found_where_nothing_is_hidden(tmp_path: Path) -> None:
     )
     assert found.names == () and not found.closed.verdict.ambiguous
     assert found.is_settled and found.reason.endswith(NOTHING)
+
+
+def test_a_hypothesis_may_be_slower_than_a_log_shows(tmp_path: Path) -> None:
+    """What settles within an experiment to come is a drift until then."""
+    real = _real(SensorWarmUp(fy=-1.5, time_constant=25.0))
+    log = GrowingLog(IMPACT, tmp_path, station="twin", real=real)
+    log.perform(Removal().plan(IMPACT))
+    closed, model = log.verdict((SensorDrift, SensorWarmUp)), log.model()
+    assert closed.verdict.names == ("SensorDrift",)
+    found = open_rivals(closed, model, twin_rival, Workers())
+    slow = next(rival for rival in found if rival.name == "SensorWarmUp")
+    [effect] = cast(TwinRival, slow).scenario.effects
+    slowest = SensorWarmUp.greatest_shapes(model.reach)["time_constant"]
+    assert cast(SensorWarmUp, effect).time_constant > slowest
 
 
 def test_a_person_may_say_no_and_a_budget_may_be_too_small(tmp_path: Path) -> None:
