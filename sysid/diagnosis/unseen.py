@@ -18,7 +18,8 @@ from sysid.workers import Workers
 
 _OF_BOUND = 0.5  # of an amplitude that no size within its bounds would have shown
 _TIMES = 2.0  # the size that would have been found
-_MOST = 6  # hypotheses at a time
+_MOST = 9  # hypotheses at a time
+_DOUBTED = 3  # of them of what the log hints at
 
 
 def unseen_rivals(
@@ -48,14 +49,31 @@ def unseen_rivals(
     fitter = fitter_of(closed, log.model(scenario), workers, folder)
     base = fitter.fit(())
     found = [TwinRival(NOTHING, 1.0, base.loss, scenario)]
-    for kind, limit in _unseen(closed.verdict.limits):
-        more = [_with(scenario, effect) for effect in _of_size(kind, limit)]
-        rival = _likeliest(limit.effect, more, log, fitter, base)
+    for name, scenarios in _hypotheses(closed, scenario).items():
+        rival = _likeliest(name, scenarios, log, fitter, base)
         if rival is not None:
             found.append(rival)
         if len(found) > _MOST:
             break
     return tuple(dataclasses.replace(each, weight=1.0 / len(found)) for each in found)
+
+
+def _hypotheses(closed: ClosedLoop, scenario: Scenario) -> dict[str, list[Scenario]]:
+    """Returns effects that the log may have hidden, by name, each in some sizes.
+
+    First what it hints at, as it was fitted: noise or the model's own error could be
+    all of that.
+    """
+    doubted = sorted(closed.search.doubted, key=lambda fit: fit.loss)[:_DOUBTED]
+    found = {}
+    for fit in doubted:
+        fitted = fit.model.scenario_at(fit.theta)
+        if fitted is not None:
+            found[fit.effects[-1].name] = [fitted]
+    for kind, limit in _unseen(closed.verdict.limits):
+        of_size = [_with(scenario, effect) for effect in _of_size(kind, limit)]
+        found.setdefault(limit.effect, of_size)
+    return found
 
 
 def _with(scenario: Scenario, effect: Effect) -> Scenario:

@@ -48,6 +48,8 @@ class RefitSelection:
         progress: gets a line after each step.
         deadline: when to stop, by `time.monotonic` [s].
         steps: what was added.
+        doubted: fits with an effect that would have been added, if noise or the model's
+            own error could not be all of what it explains.
         begin: what each candidate would gain without effects, the best first.
         is_complete: whether it ended by itself, not because its time was over.
         invalid: why the model does not hold for the log, in words; empty if it does.
@@ -58,6 +60,7 @@ class RefitSelection:
     progress: Progress = ignore_progress
     deadline: float = math.inf
     steps: list[Step] = field(default_factory=list)
+    doubted: list[Fit] = field(default_factory=list)
     begin: tuple[Gain, ...] = ()
     is_complete: bool = True
     invalid: str = ""
@@ -95,6 +98,7 @@ class RefitSelection:
     def _next(self, fit: Fit) -> Fit | None:
         """Returns the fit with one more effect; None if none is confirmed."""
         self._report(f"comparing {len(self.library)} candidates")
+        self.doubted = []
         system = linear_system(self.fitter, fit, self.library, self.deadline)
         if not fit.effects:
             self.begin = tuple(LinearAccount.of_fit(system, fit).gains())
@@ -112,6 +116,7 @@ class RefitSelection:
         if step.chosen.share < self._settings.min_gain:
             return None
         self.steps.append(step)
+        self.doubted = []  # without this one
         _, found = gains[step.chosen.term.names]
         self._report(f"{step.chosen.text}: objective {found.objective:.4g}")
         return found
@@ -137,9 +142,11 @@ class RefitSelection:
         """Returns what fits of trials gain, those that are more than noise."""
         found = {}
         for after in self._fitted(fit, system, trials):
-            gain = self._gain(fit, after)
-            if gain is not None:
+            gain = _gain(fit, after)
+            if gain and self._exceeds_noise(fit, after):
                 found[gain.term.names] = (gain, after)
+            elif gain and gain.share >= self._settings.min_gain:
+                self.doubted.append(after)
         return found
 
     def _best_shapes(self, system: LinearSystem) -> list[Gain]:
@@ -197,7 +204,11 @@ class RefitSelection:
             : self._settings.trials
         ]
         self._starts = {gain.term.names: found for gain, found in pairs}
-        of_few = [self._gain(before, found) for _, found in pairs]
+        gained = [(_gain(before, found), found) for _, found in pairs]
+        of_few = [
+            gain if gain and self._exceeds_noise(before, found) else None
+            for gain, found in gained
+        ]
         best = of_few[0] if of_few else None
         self._refuted = {
             gain.term.names
@@ -237,25 +248,14 @@ class RefitSelection:
             found = list(workers.map(_TrialFit.run, [job.alone for job in jobs]))
         return found
 
-    def _gain(self, before: Fit, after: Fit) -> Gain | None:
-        """Returns what a fit gains in blocks that it was not fitted to.
-
-        None if no amplitude is left, or noise and the model's own error can explain it.
-        """
+    def _exceeds_noise(self, before: Fit, after: Fit) -> bool:
+        """Returns whether noise and the model's own error can't explain a gain."""
+        if not after.noise_is_stated:
+            return True
         added = after.effects[len(before.effects) :]
-        if not added:
-            return None
         count = sum(len(candidate.fields) for candidate in added)
-        if after.noise_is_stated:
-            tests = len({candidate.name for candidate in self.library})
-            if tests * exceeds_noise_p(before, after, count) >= self._settings.alpha:
-                return None
-        columns = np.arange(count)
-        owners = np.repeat(
-            np.arange(len(added)), [len(candidate.fields) for candidate in added]
-        )
-        term = Term(added, columns, owners)
-        return Gain.of(term, before.held_out_losses, after.held_out_losses)
+        tests = len({candidate.name for candidate in self.library})
+        return tests * exceeds_noise_p(before, after, count) < self._settings.alpha
 
     def _without_needless(self, fit: Fit) -> Fit:
         """Returns the fit without effects that later ones have made needless."""
@@ -278,6 +278,19 @@ class RefitSelection:
 
     _starts: dict[_Names, Fit] = field(default_factory=dict)
     _refuted: set[_Names] = field(default_factory=set)
+
+
+def _gain(before: Fit, after: Fit) -> Gain | None:
+    """Returns what a fit gains in blocks that it was not fitted to.
+
+    None if no amplitude is left.
+    """
+    added = after.effects[len(before.effects) :]
+    if not added:
+        return None
+    counts = [len(candidate.fields) for candidate in added]
+    term = Term(added, np.arange(sum(counts)), np.repeat(np.arange(len(added)), counts))
+    return Gain.of(term, before.held_out_losses, after.held_out_losses)
 
 
 def _is_around(term: Term) -> bool:

@@ -44,6 +44,7 @@ class SearchResult:
         untested: candidates, as text, for which the time was not enough.
         is_complete: whether it ended by itself, not because its time was over.
         invalid: why the model does not hold for the log, in words; empty if it does.
+        doubted: see RefitSelection.
     """
 
     first: Fit
@@ -55,6 +56,7 @@ class SearchResult:
     untested: tuple[str, ...]
     is_complete: bool
     invalid: str = ""
+    doubted: tuple[Fit, ...] = ()
 
     @property
     def phase(self) -> str:
@@ -218,6 +220,7 @@ def _refit_search(
         system.untested,
         is_complete,
         selection.invalid,
+        tuple(selection.doubted),
     )
 
 

@@ -7,13 +7,22 @@ from typing import cast
 
 import pytest
 
-from drake_disasm.effects import SensorBias, SensorDrift, SensorGain, SensorWarmUp
+from drake_disasm.effects import (
+    GrooveBend,
+    GroovePose,
+    SensorBias,
+    SensorDrift,
+    SensorGain,
+    SensorWarmUp,
+)
 from drake_disasm.experiments import Presses, Removal, Rest, Reversals
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
 from sysid.diagnosis import NOTHING, Budget, GrowingLog, diagnose
 from sysid.diagnosis.loop import refuted_names
 from sysid.diagnosis.rivals import TwinRival, open_rivals, twin_rival
+from sysid.diagnosis.unseen import unseen_rivals
+from sysid.models.twin import with_impact_as_stiff
 from sysid.report import diagnosis_page
 from sysid.workers import Workers
 from tests.refusals import refused
@@ -104,6 +113,21 @@ def test_a_hypothesis_may_be_slower_than_a_log_shows(tmp_path: Path) -> None:
     [effect] = cast(TwinRival, slow).scenario.effects
     slowest = SensorWarmUp.greatest_shapes(model.reach)["time_constant"]
     assert cast(SensorWarmUp, effect).time_constant > slowest
+
+
+def test_what_the_models_own_error_may_be_stays_a_hypothesis(tmp_path: Path) -> None:
+    """A slight bend is not named; that nothing is missing can't be said, either."""
+    cell = load_scenario("removal")
+    known = with_impact_as_stiff(cell)
+    real = dataclasses.replace(cell, effects=[GrooveBend(kz=-0.05)])
+    log = GrowingLog(known, tmp_path, real=real)
+    log.perform(Removal().plan(known))
+    closed = log.verdict((GrooveBend, GroovePose))
+    assert closed.verdict.names == ()
+    found = {rival.name: rival for rival in unseen_rivals(closed, log, Workers(), None)}
+    assert set(found) == {NOTHING, "GrooveBend", "GroovePose"}
+    [bend] = found["GrooveBend"].scenario.effects
+    assert cast(GrooveBend, bend).kz == pytest.approx(-0.05, abs=0.02)
 
 
 def test_a_person_may_say_no_and_a_budget_may_be_too_small(tmp_path: Path) -> None:
