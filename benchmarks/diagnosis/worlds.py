@@ -32,7 +32,7 @@ PAIRS = (
 _SEEDS = 1000  # of noise in each world
 _PARTS = ("removal", "iiwa_peg", "iiwa_bayonet")
 #: Of each group: first seed, and how many worlds there are. Those held out are of
-#: pairs, for a last judgement: look at none while a rule is being chosen.
+#: pairs, for a last judgement: no rule was chosen on those from 94 on.
 GROUPS: Mapping[str, tuple[int, int]] = {
     "pairs": (100, 100),
     "null": (200, 20),

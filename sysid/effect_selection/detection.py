@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
@@ -12,6 +12,8 @@ from sysid.effect_selection.experiments import revealing_kind
 from sysid.effect_selection.forward_selection import Term
 from sysid.effect_selection.linear_account import LinearAccount
 from sysid.fitting.block_grams import Array
+from sysid.fitting.candidates import Candidate
+from sysid.fitting.fit import Fit
 from sysid.models.effects import field_of
 from sysid.parameters import Scaling, nominal_values
 
@@ -38,11 +40,18 @@ class DetectionLimit:
     shape: str = ""
 
 
-def detection_limits(account: LinearAccount) -> list[DetectionLimit]:
+def detection_limits(
+    account: LinearAccount, doubted: Sequence[Fit] = ()
+) -> list[DetectionLimit]:
     """Returns the limit of each amplitude of each effect, shape by shape.
 
     An effect is found if it takes away `min_gain` of the loss, if its coefficient is
     significant beside the model's own, and if the model's own error can't be all of it.
+    And no limit is below what a fit had and was not found.
+
+    Args:
+        account: of the model.
+        doubted: such fits, with an effect that the model has not.
     """
     errors = account.whole.folds(account.settings.folds).errors_beside(account.columns)
     shown = [
@@ -51,10 +60,42 @@ def detection_limits(account: LinearAccount) -> list[DetectionLimit]:
         if len(term.candidates) == 1
         for limit in _limits(account, term, errors)
     ]
+    sizes = dict(size for fit in doubted for size in _sizes(fit))
+    shown = [_at_least(each, sizes.get(_key(each), 0.0)) for each in shown]
     return shown + [
         DetectionLimit(each.name, each.fields[0], None, "1", np.inf)
         for each in account.system.unseen
     ]
+
+
+_Key = tuple[str, str, str]  # effect, field and shape
+
+
+def _key(limit: DetectionLimit) -> _Key:
+    return limit.effect, limit.field, limit.shape
+
+
+def _sizes(fit: Fit) -> list[tuple[_Key, float]]:
+    """Returns the size of each amplitude of a fit's last effect."""
+    candidate = fit.effects[-1]
+    shape = _shape_text(candidate)
+    return [
+        ((candidate.name, field, shape), abs(fit.values[f"{candidate.name}.{field}"]))
+        for field in candidate.fields
+    ]
+
+
+def _at_least(limit: DetectionLimit, size: float) -> DetectionLimit:
+    """Returns a limit that is not below a size."""
+    if limit.amplitude is None or size <= limit.amplitude:
+        return limit
+    share = limit.share * size / limit.amplitude
+    amplitude = size if share <= 1.0 else None
+    return replace(limit, amplitude=amplitude, share=share)
+
+
+def _shape_text(candidate: Candidate) -> str:
+    return ", ".join(f"{name}={value:g}" for name, value in candidate.shape.items())
 
 
 def undetectable(limits: Sequence[DetectionLimit]) -> dict[str, str]:
@@ -90,7 +131,7 @@ def _limits(account: LinearAccount, term: Term, errors: Array) -> list[Detection
     parameters = [account.system.parameters[column] for column in term.columns]
     scaling, nominal = Scaling(tuple(parameters)), nominal_values(tuple(parameters))
     at, slope = scaling.to_unit(nominal), scaling.slope(nominal)
-    shape = ", ".join(f"{k}={v:g}" for k, v in candidate.shape.items())
+    shape = _shape_text(candidate)
     found = []
     for i, column in enumerate(term.columns):
         if not equations.is_new(np.array([column]))[0]:

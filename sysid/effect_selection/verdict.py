@@ -221,7 +221,7 @@ def judge(
         correlated_channels(white),
         errors.relative(errors.after) if errors.has_meaningful_share else float("nan"),
         tuple(channel_findings(white)),
-        tuple(detection_limits(found.account)),
+        tuple(detection_limits(found.account, found.doubted)),
         tuple(left),
         misfits=tuple(misfits),
         written=tuple(Written(w.name, w.what, w.remedy) for w in written),

@@ -1,5 +1,7 @@
 """Limits of detection: effects as large as they say are found, most of the time."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -24,10 +26,10 @@ def _drawn(seed, amplitude=0.0, noise=1.0):
     return linear_system(columns, noise * random.standard_normal(_ROWS) - effect)
 
 
-def _limits(system):
+def _limits(system, doubted=()):
     found = selected(system)
     account = LinearAccount.of_selection(system, found, found.names)
-    return {limit.effect: limit for limit in detection_limits(account)}
+    return {limit.effect: limit for limit in detection_limits(account, doubted)}
 
 
 @pytest.mark.parametrize(("times", "least", "most"), [(1, 0.5, 0.97), (2, 1.0, 1.0)])
@@ -43,6 +45,19 @@ def test_limits_are_in_proportion_to_the_noise_and_none_beyond_the_bounds():
     assert quiet.unit == "N" and quiet.share == pytest.approx(quiet.amplitude / 5.0)
     deaf = _limits(_drawn(0, noise=30.0))[_NAME]
     assert deaf.amplitude is None and deaf.share > 1.0
+
+
+@pytest.mark.parametrize(("times", "expected"), [(0.5, 1.0), (3.0, 3.0)])
+def test_no_limit_is_below_what_was_fitted_and_not_found(times, expected):
+    system = _drawn(0)
+    [term] = [each for each in system.terms if each.names == (_NAME,)]
+    [candidate], alone = term.candidates, _limits(system)[_NAME]
+    effects = (candidate.only([alone.field]),)
+    values = {f"{_NAME}.{alone.field}": -times * alone.amplitude}
+    doubted = [SimpleNamespace(effects=effects, values=values)]
+    found = _limits(system, doubted)[_NAME]
+    assert found.amplitude == pytest.approx(expected * alone.amplitude)
+    assert found.share == pytest.approx(expected * alone.share)
 
 
 def test_what_the_model_itself_can_do_is_not_asked_for():
