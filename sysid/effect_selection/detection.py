@@ -17,6 +17,8 @@ from sysid.fitting.fit import Fit
 from sysid.models.effects import field_of
 from sysid.parameters import Scaling, nominal_values
 
+_Key = tuple[str, str, str]  # effect, field and shape
+
 
 @dataclass(frozen=True)
 class DetectionLimit:
@@ -25,8 +27,8 @@ class DetectionLimit:
     Attributes:
         effect: its name.
         field: of its amplitude; the others are null.
-        amplitude: SI, by the linear account; None if none within its bounds would
-            have been found.
+        amplitude: SI, by the linear account or a fit; None if none within its bounds
+            would have been found.
         unit: of the amplitude.
         share: of the way to its farther bound; above 1 if it is beyond.
         shape: values of the effect's shape parameters, as text.
@@ -66,36 +68,6 @@ def detection_limits(
         DetectionLimit(each.name, each.fields[0], None, "1", np.inf)
         for each in account.system.unseen
     ]
-
-
-_Key = tuple[str, str, str]  # effect, field and shape
-
-
-def _key(limit: DetectionLimit) -> _Key:
-    return limit.effect, limit.field, limit.shape
-
-
-def _sizes(fit: Fit) -> list[tuple[_Key, float]]:
-    """Returns the size of each amplitude of a fit's last effect."""
-    candidate = fit.effects[-1]
-    shape = _shape_text(candidate)
-    return [
-        ((candidate.name, field, shape), abs(fit.values[f"{candidate.name}.{field}"]))
-        for field in candidate.fields
-    ]
-
-
-def _at_least(limit: DetectionLimit, size: float) -> DetectionLimit:
-    """Returns a limit that is not below a size."""
-    if limit.amplitude is None or size <= limit.amplitude:
-        return limit
-    share = limit.share * size / limit.amplitude
-    amplitude = size if share <= 1.0 else None
-    return replace(limit, amplitude=amplitude, share=share)
-
-
-def _shape_text(candidate: Candidate) -> str:
-    return ", ".join(f"{name}={value:g}" for name, value in candidate.shape.items())
 
 
 def undetectable(limits: Sequence[DetectionLimit]) -> dict[str, str]:
@@ -160,3 +132,30 @@ def _least(account: LinearAccount, column: int, error: float) -> float:
     names = {name for term in account.system.terms for name in term.names}
     alpha = settings.alpha / len(names)
     return max(least, account.system.least_beyond_noise(column, alpha, above))
+
+
+def _key(limit: DetectionLimit) -> _Key:
+    return limit.effect, limit.field, limit.shape
+
+
+def _sizes(fit: Fit) -> list[tuple[_Key, float]]:
+    """Returns the size of each amplitude of a fit's last effect."""
+    candidate = fit.effects[-1]
+    shape = _shape_text(candidate)
+    return [
+        ((candidate.name, field, shape), abs(fit.values[f"{candidate.name}.{field}"]))
+        for field in candidate.fields
+    ]
+
+
+def _at_least(limit: DetectionLimit, size: float) -> DetectionLimit:
+    """Returns a limit that is not below a size."""
+    if limit.amplitude is None or size <= limit.amplitude:
+        return limit
+    share = limit.share * size / limit.amplitude
+    amplitude = size if share <= 1.0 else None
+    return replace(limit, amplitude=amplitude, share=share)
+
+
+def _shape_text(candidate: Candidate) -> str:
+    return ", ".join(f"{name}={value:g}" for name, value in candidate.shape.items())
