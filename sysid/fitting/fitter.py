@@ -18,7 +18,7 @@ from sysid.identification.gauss_newton import gauss_newton
 from sysid.identification.linearisation import Linearisation, extend
 from sysid.identification.noise import with_estimated_noise
 from sysid.models.base import LogModel
-from sysid.objective import Objective
+from sysid.objective import Objective, huber_weights
 from sysid.parameters import Scaling, by_name
 from sysid.workers import Workers
 
@@ -109,7 +109,23 @@ class Fitter:
             return found
         theta = self._settled(effects, theta)
         found = self._fit_of(effects, model.with_begins(None), theta, is_minimum=True)
-        return dataclasses.replace(found, model=model.with_begins(theta))
+        return self._at(found, model.with_begins(theta))
+
+    def _at(self, fit: Fit, model: LogModel) -> Fit:
+        """Returns a fit with another model's residuals, and the derivatives it has."""
+        objective = self.objective(model)
+        [residual] = objective.residuals(fit.theta)
+        linearisation = dataclasses.replace(
+            fit.linearisation,
+            residual=residual,
+            weights=huber_weights(residual, self.huber_delta),
+        )
+        return dataclasses.replace(
+            fit,
+            model=model,
+            linearisation=linearisation,
+            objective=objective.value(residual),
+        )
 
     def _settled(self, effects: tuple[Candidate, ...], theta: Array) -> Array:
         """Returns parameters (p,) that fit where the model begins with them.

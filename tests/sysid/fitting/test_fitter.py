@@ -5,6 +5,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.fitting.fit import Fit
 from sysid.fitting.fitter import Fitter
 from sysid.fitting.settings import DEFAULT_SETTINGS
 from sysid.identification.linearisation import linearise
@@ -37,20 +38,31 @@ class _Begun(LogModel):
         return self.replace(taken=taken)
 
 
-def _fitted(reaction: float, measured: float) -> float:
+def _fitted(reaction: float, measured: float) -> tuple[Fitter, Fit]:
     random = np.random.default_rng(1)
     model = _Begun(random.normal(measured, 0.01, 50), reaction)
     fitter = Fitter.of(model, Workers(), np.inf, DEFAULT_SETTINGS)
-    return float(fitter.fit(()).theta[0])
+    return fitter, fitter.fit(())
 
 
 def test_what_a_model_does_not_react_to_is_one_fit():
-    np.testing.assert_allclose(_fitted(0.0, 1.0), 1.0, atol=0.01)
+    _, fit = _fitted(0.0, 1.0)
+    np.testing.assert_allclose(fit.theta, 1.0, atol=0.01)
 
 
 def test_where_the_begin_overshoots_the_way_is_halved():
     """Taken in full, each way would be 1.5 times as far as the last, and back."""
-    np.testing.assert_allclose(_fitted(1.5, 1.0), 0.4, atol=0.06)
+    _, fit = _fitted(1.5, 1.0)
+    np.testing.assert_allclose(fit.theta, 0.4, atol=0.06)
+
+
+def test_residuals_of_a_fit_are_those_of_its_model():
+    """Derivatives by effects that it lacks are differences from them."""
+    fitter, fit = _fitted(1.5, 1.0)
+    objective = fitter.objective(fit.model)
+    [residual] = objective.residuals(fit.theta)
+    np.testing.assert_array_equal(fit.linearisation.residual, residual)
+    assert fit.objective == objective.value(residual)
 
 
 class _Counted(LogModel):
