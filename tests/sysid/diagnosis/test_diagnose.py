@@ -103,7 +103,7 @@ def test_nothing_is_found_where_nothing_is_hidden(tmp_path: Path) -> None:
 
 def test_a_hypothesis_may_be_slower_than_a_log_shows(tmp_path: Path) -> None:
     """What settles within an experiment to come is a drift until then."""
-    real = _real(SensorWarmUp(fy=-1.5, time_constant=25.0))
+    real = _real(SensorWarmUp(fy=-2.0, time_constant=40.0))
     log = GrowingLog(IMPACT, tmp_path, station="twin", real=real)
     log.perform(Removal().plan(IMPACT))
     closed, model = log.verdict((SensorDrift, SensorWarmUp)), log.model()
