@@ -32,7 +32,8 @@ def unseen_rivals(
 
     An effect is one of a size that matters, in the field in which more of the log would
     show it soonest, unless the log speaks against that by more than noise and the
-    model's own error. Where something is named, that is all that was asked.
+    model's own error. Where something is named, that is all that was asked; where the
+    log shows something that no effect of the library explains, nothing is.
 
     Args:
         closed: the verdict.
@@ -41,7 +42,7 @@ def unseen_rivals(
         folder: of a cache of fits.
     """
     scenario = closed.scenario
-    if scenario is None:
+    if scenario is None or closed.verdict.ending == "unexplained":
         return ()
     named = closed.verdict.confirmed
     if named:

@@ -130,6 +130,18 @@ def test_what_the_models_own_error_may_be_stays_a_hypothesis(tmp_path: Path) -> 
     assert cast(GrooveBend, bend).kz == pytest.approx(-0.05, abs=0.02)
 
 
+def test_what_is_there_and_not_in_the_library_asks_for_nothing_else(
+    tmp_path: Path,
+) -> None:
+    """Effects too small to be seen could not be what the log shows."""
+    real = _real(SensorDrift(fy=-0.05))
+    log = GrowingLog(IMPACT, tmp_path, station="twin", real=real)
+    log.perform(Removal().plan(IMPACT))
+    closed = log.verdict((GrooveBend,))
+    assert closed.verdict.ending == "unexplained"
+    assert unseen_rivals(closed, log, Workers(), None) == ()
+
+
 def test_a_person_may_say_no_and_a_budget_may_be_too_small(tmp_path: Path) -> None:
     asked: list[str] = []
 
