@@ -46,6 +46,7 @@ class Round:
     Attributes:
         verdict: in a sentence.
         names: effects that it names.
+        leaves_more: whether it leaves more than noise and the model's own errors.
         rivals: weights of the hypotheses, by name.
         experiment: that was performed then, with its parameters; empty for none.
         episode: its number in the log.
@@ -64,6 +65,7 @@ class Round:
     verdict: str
     names: tuple[str, ...]
     rivals: dict[str, float]
+    leaves_more: bool = False
     experiment: str = ""
     episode: int = -1
     distance: float = 0.0
@@ -90,7 +92,7 @@ class Diagnosis:
         predictions: of the last round's experiments, the best first.
         rivals: of the last round.
         is_refuted: whether no name stands: experiments refuted one after the other, or
-            the last leaves more than noise and the model's own errors.
+            the last ones leave more than noise and the model's own errors.
     """
 
     rounds: tuple[Round, ...]
@@ -145,10 +147,9 @@ def pursue(
         closed = subject.verdict(workers, budget.verdict, fits)
         asked = [each.names for each in session.rounds]
         rivals = subject.rivals(closed, workers, fits, asked)
-        refuted = refuted_names(asked, closed.verdict.names)
-        if is_refuted := len(refuted) >= _REFUTED:
-            predictions, best, reason = [], None, _no_name_stands(refuted)
-        else:
+        refuted = why_refuted(session.rounds, closed)
+        predictions, best, reason = [], None, refuted
+        if not refuted:
             need, left = Need.of(closed), budget.robot - session.robot_time
             predictions = session.predict(plans, rivals, need)
             best, reason = _choice(closed, rivals, predictions, need, left, asked)
@@ -163,7 +164,7 @@ def pursue(
                 session.first_time,
                 tuple(predictions),
                 rivals,
-                is_refuted or _leaves_more(closed),
+                bool(refuted) or _stands_for_another(closed),
             )
         session.experiment(closed, rivals, best)
 
@@ -212,7 +213,7 @@ def _settled(closed: ClosedLoop) -> str:
     if closed.verdict.ending == "unexplained":
         return "what the model lacks is not in the library"
     names = short_names(closed.verdict.confirmed) or NOTHING
-    if _leaves_more(closed):
+    if _stands_for_another(closed):
         return (
             f"not in the library: what comes nearest, {names}, leaves more than noise "
             "and the model's own errors"
@@ -223,15 +224,41 @@ def _settled(closed: ClosedLoop) -> str:
 
 
 def _leaves_more(closed: ClosedLoop) -> bool:
-    """Returns whether names leave more than they may.
+    """Returns whether a verdict leaves more than noise and the model's stated errors.
 
-    Where the model's own errors are stated beside the noise, what is beyond is there.
     Another effect that the library has would have been named beside: either there is
     one that it lacks, which these names stand for, or there are these and one more.
     """
     verdict, measured = closed.verdict, closed.last.model.measurements
-    is_left = verdict.has_remainder and measured.model_error is not None
-    return bool(verdict.confirmed) and is_left
+    return verdict.has_remainder and measured.model_error is not None
+
+
+def _stands_for_another(closed: ClosedLoop) -> bool:
+    """Returns whether what is confirmed stands for what the library lacks."""
+    return bool(closed.verdict.confirmed) and _leaves_more(closed)
+
+
+def why_refuted(rounds: Sequence[Round], closed: ClosedLoop) -> str:
+    """Returns why none of the library is believed; empty if one may be.
+
+    Args:
+        rounds: so far, each with the experiment after its verdict.
+        closed: the verdict after the last.
+    """
+    refuted = refuted_names([each.names for each in rounds], closed.verdict.names)
+    if len(refuted) >= _REFUTED:
+        return (
+            f"no name stands: experiments refuted {'; '.join(refuted)}, one after the "
+            "other; what the model lacks is not in the library"
+        )
+    if len(rounds) < TRIED or not _leaves_more(closed):
+        return ""
+    if not all(each.leaves_more for each in rounds[1 - TRIED :]):
+        return ""
+    return (
+        "no name stands: more than noise and the model's own errors is left after each "
+        f"of the last {TRIED} experiments; what the model lacks is not in the library"
+    )
 
 
 def refuted_names(
@@ -251,14 +278,6 @@ def refuted_names(
             found.append(short_names(sorted(each)))
             known |= set(each)
     return tuple(found)
-
-
-def _no_name_stands(refuted: Sequence[str]) -> str:
-    """Returns that experiments refuted one name after the other."""
-    return (
-        f"no name stands: experiments refuted {'; '.join(refuted)}, one after the "
-        "other; what the model lacks is not in the library"
-    )
 
 
 def _first_two(rivals: Sequence[Rival]) -> str:
@@ -433,4 +452,5 @@ class _Session:
 
 def _round(closed: ClosedLoop, rivals: Sequence[Rival]) -> Round:
     weights = {rival.name: rival.weight for rival in rivals}
-    return Round(closed.sentence, closed.verdict.names, weights)
+    more = _leaves_more(closed)
+    return Round(closed.sentence, closed.verdict.names, weights, more)

@@ -19,7 +19,7 @@ from drake_disasm.experiments import Presses, Removal, Rest, Reversals
 from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
 from sysid.diagnosis import NOTHING, Budget, GrowingLog, diagnose
-from sysid.diagnosis.loop import refuted_names
+from sysid.diagnosis.loop import Round, refuted_names, why_refuted
 from sysid.diagnosis.rivals import TwinRival, open_rivals, twin_rival
 from sysid.diagnosis.unseen import unseen_rivals
 from sysid.models.twin import with_impact_as_stiff
@@ -140,6 +140,21 @@ def test_what_is_there_and_not_in_the_library_asks_for_nothing_else(
     closed = log.verdict((GrooveBend,))
     assert closed.verdict.ending == "unexplained"
     assert unseen_rivals(closed, log, Workers(), None) == ()
+
+
+def test_names_that_leave_more_each_time_are_not_pursued(tmp_path: Path) -> None:
+    """Which of them comes nearest to what the library lacks is no question."""
+    cell = load_scenario("removal")
+    known = with_impact_as_stiff(cell)
+    real = dataclasses.replace(cell, effects=[SensorDrift(fx=-0.1)])
+    log = GrowingLog(known, tmp_path, real=real)
+    log.perform(Removal().plan(known))
+    closed = log.verdict((SensorGain,))
+    before = Round("", ("SensorGain",), {}, leaves_more=False)
+    after = dataclasses.replace(before, leaves_more=True)
+    assert "not in the library" in why_refuted((before, after, after), closed)
+    assert why_refuted((before, after), closed) == ""
+    assert why_refuted((after, after, before), closed) == ""
 
 
 def test_a_person_may_say_no_and_a_budget_may_be_too_small(tmp_path: Path) -> None:
