@@ -287,16 +287,27 @@ def _shaped(closed: ClosedLoop, name: str, library: Sequence[Candidate]) -> Cand
     for gain in closed.search.begin:
         for candidate in gain.term.candidates:
             if candidate.name == name:
-                return Candidate.of(_slower(candidate.effect, reach))
+                return Candidate.of(slower(candidate.effect, reach))
     return next(each for each in library if each.name == name)
 
 
-def _slower(effect: Effect, reach: Reach) -> Effect:
-    """Returns an effect, if as slow as a log shows, as slow as a longer one would."""
+def slower(effect: Effect, reach: Reach) -> Effect:
+    """Returns an effect, if as slow as a log shows, as slow as a longer one would.
+
+    Within its bounds, and never quicker.
+
+    Args:
+        effect: in the shape that gained most.
+        reach: of the log.
+    """
     most = effect.greatest_shapes(reach)
     ahead = effect.greatest_shapes(reach.longer(_AHEAD))
-    at_most = [name for name, value in most.items() if getattr(effect, name) >= value]
-    return dataclasses.replace(effect, **{name: ahead[name] for name in at_most})
+    found = {}
+    for field in dataclasses.fields(effect):
+        own = getattr(effect, field.name)
+        if field.name in most and own >= most[field.name]:
+            found[field.name] = max(own, min(ahead[field.name], field.metadata["high"]))
+    return dataclasses.replace(effect, **found)
 
 
 def _suspects(closed: ClosedLoop, library: Sequence[Candidate]) -> Iterator[_Set]:

@@ -10,6 +10,8 @@ import pytest
 from drake_disasm.effects import (
     GrooveBend,
     GroovePose,
+    Reach,
+    RustyPatch,
     SensorBias,
     SensorDrift,
     SensorGain,
@@ -20,7 +22,7 @@ from drake_disasm.logs import read_log
 from drake_disasm.scenario import Scenario, load_scenario
 from sysid.diagnosis import NOTHING, Budget, GrowingLog, diagnose
 from sysid.diagnosis.loop import Round, refuted_names, why_refuted
-from sysid.diagnosis.rivals import TwinRival, open_rivals, twin_rival
+from sysid.diagnosis.rivals import TwinRival, open_rivals, slower, twin_rival
 from sysid.diagnosis.unseen import unseen_rivals
 from sysid.models.twin import with_impact_as_stiff
 from sysid.report import diagnosis_page
@@ -113,6 +115,19 @@ def test_a_hypothesis_may_be_slower_than_a_log_shows(tmp_path: Path) -> None:
     [effect] = cast(TwinRival, slow).scenario.effects
     slowest = SensorWarmUp.greatest_shapes(model.reach)["time_constant"]
     assert cast(SensorWarmUp, effect).time_constant > slowest
+
+
+def test_what_is_wider_than_a_log_shows_is_not_made_narrower() -> None:
+    reach = Reach(duration=10.0, way=1e-4, speed=0.01)
+    warm, patch = SensorWarmUp(fy=1.0, time_constant=1e3), RustyPatch(coefficient=0.1)
+    assert slower(patch, reach) == patch
+    assert slower(warm, reach) == warm
+    slow = SensorWarmUp.greatest_shapes(reach)["time_constant"]
+    [quick, longer] = (
+        cast(SensorWarmUp, slower(SensorWarmUp(time_constant=own), reach))
+        for own in (0.5 * slow, slow)
+    )
+    assert quick.time_constant == 0.5 * slow and longer.time_constant > slow
 
 
 def test_what_the_models_own_error_may_be_stays_a_hypothesis(tmp_path: Path) -> None:
