@@ -88,6 +88,9 @@ class Fitter:
     ) -> Fit:
         """Returns the model with effects, fitted.
 
+        Its steps begin where its parameters say, fitted so again and again; or, if that
+        fits better, where they say without what the model knows of the grip.
+
         Args:
             effects: of the model.
             start: where to begin; parameters that it does not have begin at null.
@@ -108,8 +111,10 @@ class Fitter:
         if found.model.with_begins(found.theta) is found.model:
             return found
         theta = self._settled(effects, theta)
-        found = self._fit_of(effects, model.with_begins(None), theta, is_minimum=True)
-        return self._at(found, model.with_begins(theta))
+        varied = self._fit_of(effects, model.with_begins(None), theta, is_minimum=True)
+        settled = self._at(varied, model.with_begins(theta))
+        least = (1.0 - self.settings.fit_min_progress) * settled.objective
+        return varied if varied.objective < least else settled
 
     def _at(self, fit: Fit, model: LogModel) -> Fit:
         """Returns a fit with another model's residuals, and the derivatives it has."""
