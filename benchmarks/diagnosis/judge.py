@@ -4,8 +4,8 @@ A world is a simulated cell with hydroelastic contact, and one effect in it or n
 runner gets its model, without the effect, and seconds of its robot. Groups of worlds:
 `pairs` (an effect that logs of removals leave ambiguous with another, 100), `null`
 (nothing is hidden, 20), `missing` (an effect that the library lacks, 20), `parts` (all
-of these on three parts, 60), `held_out` (pairs again, 140; no rule was
-chosen on those from 94 on).
+of these on three parts, 60), `held_out` (pairs again, 140; no rule was chosen on those
+from 94 on).
 
 A runner is a function of `diagnosis/runners.py` (ours, passive, by_chance), or one of
 your own: MODULE:FUNCTION, in a module that Python finds, with the arguments and the

@@ -18,7 +18,7 @@ from sysid.identification.gauss_newton import gauss_newton
 from sysid.identification.linearisation import Linearisation, extend
 from sysid.identification.noise import with_estimated_noise
 from sysid.models.base import LogModel
-from sysid.objective import Objective, huber_weights
+from sysid.objective import Objective
 from sysid.parameters import Scaling, by_name
 from sysid.workers import Workers
 
@@ -120,15 +120,10 @@ class Fitter:
         """Returns a fit with another model's residuals, and the derivatives it has."""
         objective = self.objective(model)
         [residual] = objective.residuals(fit.theta)
-        linearisation = dataclasses.replace(
-            fit.linearisation,
-            residual=residual,
-            weights=huber_weights(residual, self.huber_delta),
-        )
         return dataclasses.replace(
             fit,
             model=model,
-            linearisation=linearisation,
+            linearisation=fit.linearisation.with_residual(residual),
             objective=objective.value(residual),
         )
 

@@ -64,6 +64,11 @@ class Linearisation:
         """How much each parameter moves the residuals over its range, rms (p,)."""
         return np.sqrt(np.mean(self.flat_jacobian**2, axis=0))
 
+    def with_residual(self, residual: Array) -> "Linearisation":
+        """Returns the same derivatives, with other residuals (rows, channels)."""
+        weights = huber_weights(residual, self.huber_delta)
+        return dataclasses.replace(self, residual=residual, weights=weights)
+
     def of_first(self, count: int) -> "Linearisation":
         """Returns the same of the first parameters alone."""
         if count == len(self.u):

@@ -40,6 +40,18 @@ def _real(*effects: object) -> Scenario:
     return dataclasses.replace(IMPACT, effects=list(effects))
 
 
+def _removal_from_cell(hidden: object, folder: Path) -> GrowingLog:
+    """Returns a removal's log: of a cell with an effect, its model has none."""
+    cell = load_scenario("removal")
+    known, real = (
+        with_impact_as_stiff(cell),
+        dataclasses.replace(cell, effects=[hidden]),
+    )
+    log = GrowingLog(known, folder, real=real)
+    log.perform(Removal().plan(known))
+    return log
+
+
 @pytest.fixture(scope="module")
 def warm(tmp_path_factory: pytest.TempPathFactory):
     folder = tmp_path_factory.mktemp("warm")
@@ -132,11 +144,7 @@ def test_what_is_wider_than_a_log_shows_is_not_made_narrower() -> None:
 
 def test_what_the_models_own_error_may_be_stays_a_hypothesis(tmp_path: Path) -> None:
     """A slight bend is not named; that nothing is missing can't be said, either."""
-    cell = load_scenario("removal")
-    known = with_impact_as_stiff(cell)
-    real = dataclasses.replace(cell, effects=[GrooveBend(kz=-0.05)])
-    log = GrowingLog(known, tmp_path, real=real)
-    log.perform(Removal().plan(known))
+    log = _removal_from_cell(GrooveBend(kz=-0.05), tmp_path)
     closed = log.verdict((GrooveBend, GroovePose))
     assert closed.verdict.names == ()
     found = {rival.name: rival for rival in unseen_rivals(closed, log, Workers(), None)}
@@ -159,11 +167,7 @@ def test_what_is_there_and_not_in_the_library_asks_for_nothing_else(
 
 def test_names_that_leave_more_each_time_are_not_pursued(tmp_path: Path) -> None:
     """Which of them comes nearest to what the library lacks is no question."""
-    cell = load_scenario("removal")
-    known = with_impact_as_stiff(cell)
-    real = dataclasses.replace(cell, effects=[SensorDrift(fx=-0.1)])
-    log = GrowingLog(known, tmp_path, real=real)
-    log.perform(Removal().plan(known))
+    log = _removal_from_cell(SensorDrift(fx=-0.1), tmp_path)
     closed = log.verdict((SensorGain,))
     before = Round("", ("SensorGain",), {}, leaves_more=False)
     after = dataclasses.replace(before, leaves_more=True)
